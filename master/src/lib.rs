@@ -1,0 +1,9 @@
+//! The master: it plans a solve, computes direct light and far field, solves for the radiosities of
+//! all faces, and writes what came out.
+
+#![allow(
+    non_snake_case,
+    reason = "units in names are written as units: irradiance_W_m2"
+)]
+
+pub mod solution;
