@@ -48,13 +48,19 @@ impl LeafOptics {
     /// An opaque material with the same reflectance on both faces.
     pub fn opaque(rho: f64) -> Self {
         let face = FaceOptics { rho, tau: 0.0 };
-        Self { upper: face, lower: face }
+        Self {
+            upper: face,
+            lower: face,
+        }
     }
 
     /// The same properties on both faces.
     pub fn symmetric(rho: f64, tau: f64) -> Self {
         let face = FaceOptics { rho, tau };
-        Self { upper: face, lower: face }
+        Self {
+            upper: face,
+            lower: face,
+        }
     }
 
     /// Refuses what is not physical: negative, not finite, or `rho + tau > 1` on a face.
