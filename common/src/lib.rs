@@ -8,6 +8,11 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod directions;
+pub mod elements;
+pub mod ends;
+pub mod geometry;
+pub mod lattice;
 pub mod light;
 pub mod optics;
 pub mod problem;
