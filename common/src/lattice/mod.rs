@@ -6,10 +6,12 @@
 //! world: whichever part of a scene is drawn, the same line meets the same triangles.
 
 mod scan;
+mod strips;
 
 use glam::{DVec2, DVec3};
 
 pub use scan::{Fragment, Projected};
+pub use strips::Strips;
 
 /// Where lines may run: what fixes a lattice to the world.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,7 @@
 //! the cache. Within a strip fragments are sorted by line with a counting sort, then by depth.
 
 use nestrad_common::elements;
-use nestrad_common::lattice::{Lattice, Projected};
+use nestrad_common::lattice::{Lattice, Projected, Strips};
 
 use crate::block::Block;
 
@@ -42,78 +42,13 @@ const LINES_IN_STRIP: usize = 1 << 14;
 
 /// Calls `line` with the hits of every line of the lattice, by rising depth; lines by rising number.
 pub(crate) fn for_each_line(block: &Block, lattice: &Lattice, mut line: impl FnMut(usize, &[Hit])) {
-    let rows_in_strip = (LINES_IN_STRIP / lattice.nx as usize).max(1) as u32;
-    let strips = lattice.ny.div_ceil(rows_in_strip);
-    let members = (strips > 1).then(|| members_of_strips(block, lattice, rows_in_strip, strips));
+    let strips = Strips::new(lattice, &block.triangles, LINES_IN_STRIP);
     let mut strip = Strip::default();
-    for s in 0..strips {
-        let rows = s * rows_in_strip..((s + 1) * rows_in_strip).min(lattice.ny);
-        match &members {
-            Some(m) => strip.draw(block, lattice, rows, m.of(s).iter().copied()),
-            None => strip.draw(block, lattice, rows, 0..block.triangles.len() as u32),
-        }
+    for s in 0..strips.len() {
+        strip.draw(block, lattice, strips.rows(s), strips.triangles(s));
         strip.sort();
         strip.for_each_line(&mut line);
     }
-}
-
-/// The triangles of each strip.
-struct Members {
-    start: Vec<usize>,
-    triangles: Vec<u32>,
-}
-
-impl Members {
-    fn of(&self, strip: u32) -> &[u32] {
-        &self.triangles[self.start[strip as usize]..self.start[strip as usize + 1]]
-    }
-}
-
-fn members_of_strips(block: &Block, lattice: &Lattice, rows_in_strip: u32, strips: u32) -> Members {
-    let ny = i64::from(lattice.ny);
-    let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(block.triangles.len() * 2);
-    for (t, triangle) in block.triangles.iter().enumerate() {
-        let Some(projected) = Projected::new(lattice, triangle) else {
-            continue;
-        };
-        let rows = projected.rows();
-        if lattice.periodic && rows.end - rows.start >= ny {
-            pairs.extend((0..strips).map(|s| (s, t as u32)));
-            continue;
-        }
-        let strip_of = |row: i64| (row / i64::from(rows_in_strip)) as u32;
-        let mut add = |from: i64, to: i64| {
-            if from < to {
-                pairs.extend((strip_of(from)..=strip_of(to - 1)).map(|s| (s, t as u32)));
-            }
-        };
-        if lattice.periodic {
-            let from = rows.start.rem_euclid(ny);
-            let to = from + rows.end - rows.start;
-            // the part past the seam may reach back into the strip where it began: once is enough
-            add(from, to.min(ny));
-            let past = (to - ny)
-                .max(0)
-                .min(i64::from(rows_in_strip) * i64::from(strip_of(from)));
-            add(0, past);
-        } else {
-            add(rows.start.max(0), rows.end.min(ny));
-        }
-    }
-    let mut start = vec![0usize; strips as usize + 1];
-    for &(s, _) in &pairs {
-        start[s as usize + 1] += 1;
-    }
-    for s in 0..strips as usize {
-        start[s + 1] += start[s];
-    }
-    let mut next = start.clone();
-    let mut triangles = vec![0; pairs.len()];
-    for (s, t) in pairs {
-        triangles[next[s as usize]] = t;
-        next[s as usize] += 1;
-    }
-    Members { start, triangles }
 }
 
 /// Fragments of one strip of the lattice; buffers are kept from strip to strip.

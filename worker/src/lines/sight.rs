@@ -9,7 +9,6 @@ use crate::rows::Pair;
 /// Turns the sorted hits of a line into pairs that see each other.
 pub(crate) struct Sight<'a> {
     block: &'a Block,
-    lattice: &'a Lattice,
     soil: Option<SoilUnder>,
     sky: u32,
     below: u32,
@@ -19,13 +18,12 @@ pub(crate) struct Sight<'a> {
 }
 
 impl<'a> Sight<'a> {
-    pub(crate) fn new(block: &'a Block, lattice: &'a Lattice) -> Self {
+    pub(crate) fn new(block: &'a Block, lattice: &Lattice) -> Self {
         let ends = &block.ends;
         let steps = (block.radius_m / lattice.distance_m(1)).ceil();
         let cosine = lattice.direction.z;
         Self {
             block,
-            lattice,
             soil: block.soil.map(|soil| SoilUnder::new(&soil, lattice)),
             sky: block.local(ends.sky()),
             below: block.local(if block.soil.is_some() {
