@@ -1,5 +1,9 @@
 //! Light that falls on the canopy: a list of parallel sources.
 
+pub mod sky;
+pub mod spec;
+pub mod sun;
+
 use glam::DVec3;
 
 /// A parallel source: the sun, or one direction of a sky.
