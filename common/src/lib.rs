@@ -8,6 +8,7 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod generate;
 pub mod light;
 pub mod optics;
 pub mod problem;

@@ -1,34 +1,30 @@
-//! Light as a user describes it, before it is turned into sources.
+//! What a user says of a sky, before it is turned into parallel sources.
 
-use serde::Deserialize;
-
-/// A built-in sky.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(rename_all = "snake_case", deny_unknown_fields)]
+/// The distribution of radiance over the sky.
+#[derive(Clone, Debug, PartialEq)]
 pub enum Sky {
     /// The same radiance from everywhere.
     UniformOvercast,
-    /// Moon–Spencer: radiance proportional to `(1 + 2 sin elevation) / 3`.
+    /// Moon and Spencer: the zenith three times as bright as the horizon.
     StandardOvercast,
-    /// The sun and a cloudless sky; x points east and y north.
+    /// A clear sky and the sun.
     Clear {
-        /// RFC 3339 in UTC, e.g. `2024-06-21T12:00:00Z`.
+        /// Date and time in UTC, as RFC 3339 writes them: `2024-06-21T12:00:00Z`.
         time_utc: String,
         /// Degrees, north positive, -90 to 90.
         latitude_deg: f64,
         /// Degrees, east positive, -180 to 180.
         longitude_deg: f64,
-        /// Part of the irradiance on the horizontal that does not come straight from the sun, 0 to 1.
+        /// Part of the irradiance that comes from the sky and not straight from the sun, 0 to 1.
         diffuse_fraction: f64,
     },
 }
 
-/// A built-in sky and how bright it is.
-#[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(deny_unknown_fields)]
+/// A sky and how much light it brings.
+#[derive(Clone, Debug, PartialEq)]
 pub struct SkyLight {
-    /// Where the light comes from.
+    /// The distribution.
     pub sky: Sky,
-    /// Sun and sky together on the horizontal, per band, W m⁻².
+    /// Per band, total on a horizontal plane above the canopy, W m⁻², each finite and `>= 0`.
     pub irradiance_W_m2: Vec<f64>,
 }
