@@ -155,13 +155,29 @@ mod tests {
         }
     }
 
-    /// Campbell (1990) fits the mean inclination of his distribution by 9.65 (3 + chi)^-1.65 radians.
+    /// The density and its normalisation as in Campbell (1990, Agricultural and Forest Meteorology 49:173-176).
     #[test]
-    fn the_ellipsoid_has_campbells_mean() {
-        for chi in [0.5, 0.9, 1.1, 2.0, 5.0] {
-            let mean = mean_deg(LeafAngles::Ellipsoidal { chi });
-            let fit = (9.65 * f64::powf(3.0 + chi, -1.65)).to_degrees();
-            assert!((mean - fit).abs() < 1.5, "{chi}: {mean} and {fit}");
+    fn the_ellipsoid_has_campbells_density() {
+        for chi in [0.2_f64, 0.5, 0.9, 1.1, 2.0, 5.0] {
+            let lambda = if chi < 1.0 {
+                let e = (1.0 - chi * chi).sqrt();
+                chi + e.asin() / e
+            } else {
+                let e = (1.0 - 1.0 / (chi * chi)).sqrt();
+                chi + ((1.0 + e) / (1.0 - e)).ln() / (2.0 * e * chi)
+            };
+            let angles = LeafAngles::Ellipsoidal { chi };
+            for t in [0.1_f64, 0.5, 1.0, 1.5] {
+                let shape = t.cos().powi(2) + chi * chi * t.sin().powi(2);
+                let density = 2.0 * chi.powi(3) * t.sin() / (lambda * shape * shape);
+                let step = 1e-4;
+                let slope =
+                    (angles.cumulative(t + step) - angles.cumulative(t - step)) / (2.0 * step);
+                assert!(
+                    (slope - density).abs() < 1e-6 * density.max(1.0),
+                    "{chi} {t}"
+                );
+            }
         }
     }
 

@@ -43,7 +43,7 @@ const NODES: u32 = 9;
 const LOWEST_NODE_M: f64 = 0.08;
 const INTERNODE_M: f64 = 0.045;
 /// Of the largest terminal leaflet of an average plant, metres; and width over length.
-const LEAFLET_LENGTH_M: f64 = 0.095;
+const LEAFLET_LENGTH_M: f64 = 0.105;
 const LEAFLET_SLENDERNESS: f64 = 0.68;
 /// Mean of [`relative_width`] along the leaflet.
 const MEAN_RELATIVE_WIDTH: f64 = 0.72;

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::canopy::Generated;
 use crate::light::sky::SkyError;
-use crate::light::spec::{Sky, SkyLight};
+use crate::light::{Sky, SkyLight};
 
 /// Typical of green leaves; upper and lower faces differ, as they do in nature.
 const PAR_OPT: &str = "\
@@ -120,7 +120,8 @@ fn clear_light() -> Result<String, SkyError> {
     Ok(text)
 }
 
-/// Complete files under provisional names; those that are not published are removed.
+/// Files under provisional names, in the order of their publication; those that are still there when
+/// this is dropped are removed.
 #[derive(Default)]
 struct Drafts(Vec<(PathBuf, PathBuf)>);
 
@@ -147,9 +148,12 @@ impl Drafts {
         })
     }
 
-    fn publish(mut self) -> Result<(), WriteError> {
-        for (draft, path) in std::mem::take(&mut self.0) {
-            fs::rename(&draft, &path).map_err(|source| WriteError::Io { path, source })?;
+    fn publish(self) -> Result<(), WriteError> {
+        for (draft, path) in &self.0 {
+            fs::rename(draft, path).map_err(|source| WriteError::Io {
+                path: path.clone(),
+                source,
+            })?;
         }
         Ok(())
     }
@@ -178,4 +182,100 @@ pub enum WriteError {
     /// The light could not be made.
     #[error(transparent)]
     Light(#[from] SkyError),
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeMap;
+
+    use super::*;
+    use crate::generate::{Bean, Maize};
+
+    fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+        let entry = |entry: io::Result<fs::DirEntry>| {
+            let path = entry.unwrap().path();
+            let name = path.file_name().unwrap().to_string_lossy().into_owned();
+            (name, fs::read(&path).unwrap())
+        };
+        fs::read_dir(folder).unwrap().map(entry).collect()
+    }
+
+    #[test]
+    fn one_seed_gives_the_same_bytes_and_another_does_not() {
+        let written = |seed| {
+            let folder = tempfile::tempdir().unwrap();
+            let canopy = Bean {
+                seed,
+                ..Bean::default()
+            };
+            canopy
+                .generate()
+                .unwrap()
+                .write(folder.path(), "bean")
+                .unwrap();
+            files(folder.path())
+        };
+        let first = written(1);
+        let names: Vec<_> = first.keys().map(String::as_str).collect();
+        assert_eq!(
+            names,
+            [
+                "bean.8",
+                "bean.can",
+                "clear.light",
+                "nir.opt",
+                "par.opt",
+                "scene.toml"
+            ]
+        );
+        assert!(first == written(1));
+        assert!(first["bean.can"] != written(2)["bean.can"]);
+    }
+
+    #[test]
+    fn numbers_read_back_as_they_were() {
+        let folder = tempfile::tempdir().unwrap();
+        let canopy = Maize::default().generate().unwrap();
+        canopy.write(folder.path(), "maize").unwrap();
+        let numbers = |name: &str| -> Vec<Vec<f64>> {
+            let text = fs::read_to_string(folder.path().join(name)).unwrap();
+            let line = |line: &str| {
+                line.split(' ')
+                    .filter_map(|word| word.parse().ok())
+                    .collect()
+            };
+            text.lines()
+                .filter(|l| !l.starts_with('#'))
+                .map(line)
+                .collect()
+        };
+        let polygons = numbers("maize.can");
+        assert_eq!(polygons.len(), canopy.triangles.len());
+        for ((read, triangle), label) in polygons.iter().zip(&canopy.triangles).zip(&canopy.labels)
+        {
+            // number of labels, the label, number of vertices, vertices
+            assert_eq!(read[1], label.to_string().parse::<f64>().unwrap());
+            let vertices: Vec<f64> = triangle.iter().flat_map(|v| v.to_array()).collect();
+            assert_eq!(read[3..], vertices);
+        }
+        let pattern = canopy.pattern;
+        let corners =
+            [pattern.min_m, pattern.min_m + pattern.size_m].map(|c| c.to_array().to_vec());
+        assert_eq!(numbers("maize.8"), corners);
+        let light = numbers("clear.light");
+        assert_eq!(light.len(), 47);
+        let total: f64 = light.iter().map(|source| source[0]).sum();
+        assert!((total - 500.0).abs() < 1e-10);
+    }
+
+    #[test]
+    fn what_fails_leaves_nothing_behind() {
+        let folder = tempfile::tempdir().unwrap();
+        let canopy = Bean::default().generate().unwrap();
+        fs::create_dir(folder.path().join("clear.light.partial")).unwrap();
+        let error = canopy.write(folder.path(), "bean").unwrap_err().to_string();
+        assert!(error.contains("clear.light.partial"), "{error}");
+        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+        assert_eq!(left.len(), 1);
+    }
 }

@@ -63,3 +63,6 @@ fn check_leaf_triangle(area_m2: f64) -> Result<(), GenerateError> {
         "1e-7 to 1e-2",
     )
 }
+
+#[cfg(test)]
+mod tests;

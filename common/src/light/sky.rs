@@ -14,9 +14,8 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use thiserror::Error;
 
-use super::Source;
-use super::spec::{Sky, SkyLight};
 use super::sun::{Sun, SunError};
+use super::{Sky, SkyLight, Source};
 
 /// Turn from one direction of the spiral to the next, radians: a full turn over the square of the
 /// golden ratio.
