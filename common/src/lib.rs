@@ -11,6 +11,7 @@
 pub mod directions;
 pub mod elements;
 pub mod ends;
+pub mod generate;
 pub mod geometry;
 pub mod lattice;
 pub mod light;
