@@ -8,7 +8,12 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod assemble;
+pub mod formats;
+pub mod inputs;
+pub mod inspection;
 pub mod light;
 pub mod optics;
+pub mod options;
 pub mod problem;
 pub mod scene;

@@ -1,6 +1,10 @@
 //! Light that falls on the canopy: a list of parallel sources.
 
+mod spec;
+
 use glam::DVec3;
+
+pub use spec::{Sky, SkyLight};
 
 /// A parallel source: the sun, or one direction of a sky.
 #[derive(Clone, Debug, PartialEq)]
