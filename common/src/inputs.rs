@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use thiserror::Error;
+
 use crate::formats::Place;
 use crate::light::Sky;
 use crate::optics::LeafOptics;
@@ -87,5 +89,73 @@ pub enum LightInput {
         sky: Sky,
         /// One for every band.
         irradiance_W_m2: BTreeMap<String, f64>,
+    },
+}
+
+impl LightInput {
+    /// Refuses a sky that cannot be. Files are checked as they are read.
+    pub fn check(&self) -> Result<(), LightFault> {
+        let Self::Sky {
+            sky,
+            irradiance_W_m2,
+        } = self
+        else {
+            return Ok(());
+        };
+        for (band, &found) in irradiance_W_m2 {
+            if !(found.is_finite() && found >= 0.0) {
+                let band = band.clone();
+                return Err(LightFault::Irradiance { band, found });
+            }
+        }
+        let Sky::Clear {
+            latitude_deg,
+            longitude_deg,
+            diffuse_fraction,
+            ..
+        } = sky
+        else {
+            return Ok(());
+        };
+        for (value, found, low, high) in [
+            ("latitude_deg", *latitude_deg, -90.0, 90.0),
+            ("longitude_deg", *longitude_deg, -180.0, 180.0),
+            ("diffuse_fraction", *diffuse_fraction, 0.0, 1.0),
+        ] {
+            if !(low..=high).contains(&found) {
+                return Err(LightFault::Range {
+                    value,
+                    low,
+                    high,
+                    found,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why a sky was refused.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum LightFault {
+    /// Less than no light, or no number.
+    #[error("irradiance in band {band}: expected a finite number of at least 0, found {found}")]
+    Irradiance {
+        /// The band's name.
+        band: String,
+        /// As given, W m⁻².
+        found: f64,
+    },
+    /// A value that is nowhere on earth, or no fraction.
+    #[error("{value}: expected {low} to {high}, found {found}")]
+    Range {
+        /// Its name.
+        value: &'static str,
+        /// The least it may be.
+        low: f64,
+        /// The most it may be.
+        high: f64,
+        /// As given.
+        found: f64,
     },
 }

@@ -59,6 +59,9 @@ pub struct MaterialFacts {
     pub area_m2: f64,
 }
 
+/// Beyond this distance the user's coordinates, as doubles, are coarser than a micrometre.
+const FAR_M: f64 = 1e-6 / f64::EPSILON;
+
 /// Looks through a scene; `origins` serves to name file and line in the warnings.
 pub fn inspect(scene: &Scene, origins: &Origins) -> Inspection {
     let mut facts = Inspection {
@@ -86,6 +89,15 @@ pub fn inspect(scene: &Scene, origins: &Origins) -> Inspection {
     facts.areas(scene, origins, (upper - lower).truncate());
     facts.find_duplicates(scene, origins);
     facts.find_below_soil(scene, origins);
+    let farthest = (lower + scene.origin_m)
+        .abs()
+        .max((upper + scene.origin_m).abs());
+    if farthest.max_element() > FAR_M {
+        facts.warnings.push(format!(
+            "coordinates reach {} m from zero, where they are rounded to more than a micrometre",
+            farthest.max_element()
+        ));
+    }
     if let Some(pattern) = scene.pattern
         && facts.overhang_m > 10.0 * pattern.size_m.max_element()
     {
@@ -128,7 +140,7 @@ impl Inspection {
         if let Some(first) = first_degenerate {
             self.warn(
                 self.degenerate,
-                "without area, will get no light",
+                "without area, for which no light is computed",
                 origins,
                 first,
             );
@@ -170,7 +182,7 @@ impl Inspection {
         if let Some(first) = first {
             self.warn(
                 self.duplicates,
-                "the same as an earlier one, share its light",
+                "with the same vertices as an earlier one",
                 origins,
                 first,
             );
@@ -198,7 +210,7 @@ impl Inspection {
         let s = if count == 1 { "" } else { "s" };
         let place = origins.place(first);
         self.warnings
-            .push(format!("{count} triangle{s} {what}; the first is {place}"));
+            .push(format!("{count} triangle{s} {what}, the first in {place}"));
     }
 }
 

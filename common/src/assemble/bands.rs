@@ -58,11 +58,23 @@ impl BandOptics {
                 self.opt.as_ref().and_then(|opt| opt.material(material))
             }
         };
-        found.ok_or_else(|| match (material, &self.opt) {
+        let Some(optics) = found else {
+            return Err(self.unknown(material, used()));
+        };
+        optics.check().map_err(|fault| LoadError::Optics {
+            material: material.to_string(),
+            band: self.title(),
+            fault,
+        })?;
+        Ok(optics)
+    }
+
+    fn unknown(&self, material: &Material, used: Place) -> LoadError {
+        match (material, &self.opt) {
             (Material::Soil, _) => self.no_albedo(),
             (Material::Stem { species } | Material::Leaf { species }, Some(opt)) => {
                 LoadError::UnknownSpecies {
-                    used: used(),
+                    used,
                     species: *species,
                     opt_file: opt.file.clone(),
                     known: opt.species.len(),
@@ -70,11 +82,11 @@ impl BandOptics {
                 }
             }
             _ => LoadError::UnknownMaterial {
-                used: used(),
+                used,
                 material: material.to_string(),
                 band: self.title(),
             },
-        })
+        }
     }
 
     /// The name for messages, with the line of the scene file if it is in one.
@@ -100,10 +112,9 @@ pub fn resolve_band(
     let materials = materials
         .map(|(index, material)| optics.material(material, || origins.first_use(scene, index)))
         .collect::<Result<_, _>>()?;
-    let soil_albedo = match (optics.soil_albedo(), scene.soil_z_m) {
-        (Some(albedo), _) => albedo,
-        (None, Some(_)) => return Err(optics.no_albedo()),
-        (None, None) => 0.0,
+    let soil_albedo = match scene.soil_z_m {
+        Some(_) => optics.material(&Material::Soil, Place::default)?.upper.rho,
+        None => optics.soil_albedo().unwrap_or(0.0),
     };
     Ok(Band {
         name: optics.name,

@@ -3,6 +3,8 @@
 use thiserror::Error;
 
 use crate::formats::{FormatError, MAX_COORDINATE, MAX_TRIANGLES, Place};
+use crate::inputs::LightFault;
+use crate::optics::OpticsFault;
 use crate::options::OptionFault;
 
 /// Why no problem could be made of the inputs.
@@ -14,6 +16,19 @@ pub enum LoadError {
     /// An option is out of its range.
     #[error(transparent)]
     Option(#[from] OptionFault),
+    /// The sky cannot be.
+    #[error(transparent)]
+    Light(#[from] LightFault),
+    /// Optical properties that did not come from a file are not physical.
+    #[error("{material} in band {band}: {fault}")]
+    Optics {
+        /// The material.
+        material: String,
+        /// The band.
+        band: String,
+        /// What is wrong.
+        fault: OpticsFault,
+    },
     /// Nothing says what is to be computed.
     #[error("expected {expected}, found none")]
     Missing {

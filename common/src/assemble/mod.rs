@@ -52,6 +52,7 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
             expected: "light: a .light file or a sky",
         });
     };
+    light.check()?;
 
     // small files first: what is wrong with them should not wait for a canopy to be read
     let optics = inputs

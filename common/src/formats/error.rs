@@ -6,7 +6,7 @@ use std::io;
 use thiserror::Error;
 
 /// A file, and the line in it where that is known.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Place {
     /// The file as the user named it.
     pub file: String,
@@ -62,12 +62,12 @@ pub enum FormatError {
         /// What stands there, shortened and made printable.
         found: String,
     },
-    /// A TOML file that does not parse, or not to what a scene file holds.
+    /// A scene file that is no TOML, or says what cannot be.
     #[error("{place}: {message}")]
-    Toml {
+    Scene {
         /// Where.
         place: Place,
-        /// In the words of the TOML parser.
+        /// What is wrong, in the words of the TOML parser or of what was refused.
         message: String,
     },
 }
@@ -77,7 +77,7 @@ impl FormatError {
     pub fn place(&self) -> Place {
         match self {
             Self::Read { file, .. } => Place::file(file),
-            Self::Content { place, .. } | Self::Toml { place, .. } => place.clone(),
+            Self::Content { place, .. } | Self::Scene { place, .. } => place.clone(),
         }
     }
 }

@@ -13,6 +13,9 @@ use crate::scene::{Material, Organ};
 /// The name of a group, object or material where the file has none.
 pub const UNNAMED: &str = "default";
 
+/// Longer names are refused, as every organ of an object holds a copy of its name.
+pub const MAX_NAME_BYTES: usize = 255;
+
 /// Parses an OBJ file (unpacked); `file` is its name in messages.
 pub fn parse(file: &str, bytes: &[u8]) -> Result<Mesh, FormatError> {
     let mut mesh = Mesh::new(file);
@@ -30,16 +33,16 @@ pub fn parse(file: &str, bytes: &[u8]) -> Result<Mesh, FormatError> {
                 mesh.push_polygon(&fields, &polygon, organ, material)?;
             }
             b"o" => {
-                names.object = name(&mut fields);
+                names.object = name(&mut fields)?;
                 names.group = None;
                 names.current = None;
             }
             b"g" => {
-                names.group = name(&mut fields);
+                names.group = name(&mut fields)?;
                 names.current = None;
             }
             b"usemtl" => {
-                names.material = name(&mut fields);
+                names.material = name(&mut fields)?;
                 names.current = None;
             }
             b"vt" | b"vn" | b"vp" | b"s" | b"mtllib" | b"l" | b"p" => {}
@@ -51,9 +54,19 @@ pub fn parse(file: &str, bytes: &[u8]) -> Result<Mesh, FormatError> {
     Ok(mesh)
 }
 
-fn name(fields: &mut Fields<'_>) -> Option<String> {
+fn name(fields: &mut Fields<'_>) -> Result<Option<String>, FormatError> {
     let text = fields.text();
-    (!text.is_empty()).then(|| String::from_utf8_lossy(text).into_owned())
+    if text.is_empty() {
+        return Ok(None);
+    }
+    let name = std::str::from_utf8(text).ok();
+    match name.filter(|name| name.len() <= MAX_NAME_BYTES) {
+        Some(name) => Ok(Some(name.to_owned())),
+        None => Err(fields.fault(
+            format_args!("a name in UTF-8 of at most {MAX_NAME_BYTES} bytes"),
+            Some(text),
+        )),
+    }
 }
 
 /// What the faces that follow belong to.

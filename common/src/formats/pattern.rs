@@ -6,7 +6,10 @@ use super::error::{FormatError, Place};
 use super::lines::Lines;
 use super::mesh::MAX_COORDINATE;
 
-/// A rectangle in the file's own unit and coordinates, with an area above zero.
+/// On anything smaller, in the file's unit, no plant stands.
+pub const MIN_SIDE: f64 = 1e-9;
+
+/// A rectangle in the file's own unit and coordinates, with sides of [`MIN_SIDE`] or more.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rectangle {
     /// Lower corner.
@@ -16,7 +19,8 @@ pub struct Rectangle {
 }
 
 impl Rectangle {
-    /// From two opposite corners in any order, x y and x y; what is wrong with them otherwise.
+    /// From two opposite corners in any order, x y and x y; `None` if they span no area, are not finite, or
+    /// lie too far out.
     pub fn from_corners(corners: [f64; 4]) -> Option<Self> {
         let [x0, y0, x1, y1] = corners;
         let (a, b) = (DVec2::new(x0, y0), DVec2::new(x1, y1));
@@ -24,7 +28,8 @@ impl Rectangle {
         let proper = corners
             .iter()
             .all(|value| value.is_finite() && value.abs() <= MAX_COORDINATE);
-        (proper && min.cmplt(max).all()).then_some(Self { min, max })
+        let area = (max - min).min_element() >= MIN_SIDE;
+        (proper && area).then_some(Self { min, max })
     }
 }
 
@@ -51,7 +56,7 @@ pub(super) fn refused(place: Place, corners: [f64; 4]) -> FormatError {
     FormatError::Content {
         place,
         expected: format!(
-            "corners that differ in x and in y, finite and within {MAX_COORDINATE:e} of zero"
+            "corners {MIN_SIDE:e} or more apart in x and in y, finite and within {MAX_COORDINATE:e} of zero"
         ),
         found: corners.map(|value| value.to_string()).join(" "),
     }
