@@ -60,9 +60,14 @@ impl Ends {
         self.rows() + 2
     }
 
+    /// The inside of something solid: what looks at it is buried.
+    pub fn buried(&self) -> u32 {
+        self.rows() + 3
+    }
+
     /// First end of the far field.
     pub fn far_start(&self) -> u32 {
-        self.rows() + 3
+        self.rows() + 4
     }
 
     /// Scattered light at a level, in bin `bin` of the light that comes down (from above).
@@ -85,7 +90,7 @@ impl Ends {
         self.far_start() as usize + self.far_len() as usize
     }
 
-    /// There are always the sky, the void and the outer soil.
+    /// There is always the sky.
     pub fn is_empty(&self) -> bool {
         false
     }

@@ -2,10 +2,11 @@
 //! and their rows are put together.
 
 use glam::DVec3;
-use nestrad_common::directions::{Purpose, hemisphere, stream};
+use nestrad_common::directions::{Axes, Purpose, axes, stream};
 use nestrad_common::scene::Scene;
 use nestrad_proto::v1;
 use rand::RngExt;
+use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::world::World;
@@ -16,14 +17,25 @@ pub struct Sampling {
     /// Independent batches of directions, an even number; the first half of them carries light one
     /// way, the second half the other way.
     pub batches: u32,
-    /// Directions of parallel lines in a batch; 0 to use rays only.
-    pub directions_per_batch: u32,
+    /// Axes of parallel lines that make a set.
+    pub axes: Axes,
+    /// Sets of axes in a batch; 0 to use rays only.
+    pub sets_per_batch: u32,
     /// Cross-section of a line, m².
     pub line_area_m2: f64,
     /// Samples that every face gets at least, in each half; rays from the face make up for lines.
     pub least_samples: f64,
     /// Start of all random numbers.
     pub seed: u64,
+}
+
+impl Sampling {
+    /// Lines of a half that meet a square metre of leaf, on average over its inclination: they see
+    /// |cos| of its area, whose mean over the hemisphere is 1/2.
+    pub fn lines_per_m2(&self) -> f64 {
+        let directions = self.batches / 2 * self.sets_per_batch * self.axes.count();
+        0.5 * f64::from(directions) / self.line_area_m2
+    }
 }
 
 /// The rows of one batch.
@@ -50,6 +62,77 @@ pub struct Exchange {
     pub batches: Vec<BatchRows>,
     /// Lines, segments between hits, rays.
     pub counters: Traced,
+}
+
+/// What the rows see that is not a radiosity to solve for.
+#[derive(Clone, Debug, Default)]
+pub struct Outlook {
+    /// One over the number of lines of a row that count, in each half; 0 for a row without.
+    pub weight: [Vec<f64>; 2],
+    /// The part of each row that is not buried in something solid.
+    pub exposed: Vec<f64>,
+    /// The part of what each row sends out that leaves to the sky.
+    pub to_sky: Vec<f64>,
+    /// The part of what each row sends out that leaves downwards, or to the soil beyond the map.
+    pub to_void: Vec<f64>,
+}
+
+impl Exchange {
+    /// Counts what is seen by each row.
+    pub fn outlook(&self, world: &World) -> Outlook {
+        let half = self.batches.len() / 2;
+        let rows: Vec<[f64; 5]> = (0..world.rows())
+            .into_par_iter()
+            .map(|row| {
+                // lines that count in each half, buried ones, those to the sky, those below
+                let (mut counted, mut buried, mut sky, mut void) =
+                    ([0usize; 2], 0usize, 0usize, 0usize);
+                for (k, batch) in self.batches.iter().enumerate() {
+                    let counted = &mut counted[usize::from(k >= half)];
+                    for &end in batch.row(row) {
+                        // ends that are not rows are rare
+                        if end < world.ends.sky() {
+                            *counted += 1;
+                        } else if end == world.ends.buried() {
+                            buried += 1;
+                        } else {
+                            *counted += 1;
+                            sky += usize::from(end == world.ends.sky());
+                            void += usize::from(
+                                end == world.ends.void() || end == world.ends.outer_soil(),
+                            );
+                        }
+                    }
+                }
+                let all = counted[0] + counted[1];
+                let per = |part: usize, of: usize| {
+                    if of == 0 {
+                        0.0
+                    } else {
+                        part as f64 / of as f64
+                    }
+                };
+                [
+                    per(1, counted[0]),
+                    per(1, counted[1]),
+                    if buried == 0 {
+                        1.0
+                    } else {
+                        per(all, all + buried)
+                    },
+                    per(sky, all),
+                    per(void, all),
+                ]
+            })
+            .collect();
+        let column = |c: usize| rows.iter().map(|r| r[c]).collect::<Vec<f64>>();
+        Outlook {
+            weight: [column(0), column(1)],
+            exposed: column(2),
+            to_sky: column(3),
+            to_void: column(4),
+        }
+    }
 }
 
 /// What the kernel did.
@@ -110,23 +193,25 @@ pub fn world_message(world: &World) -> v1::World {
 /// A batch: its directions and everything random in it.
 pub fn batch_message(sampling: &Sampling, index: u32) -> v1::Batch {
     let mut rng = stream(sampling.seed, Purpose::Lines, u64::from(index));
-    let lines = hemisphere(sampling.directions_per_batch, &mut rng)
+    let lines = axes(sampling.axes, sampling.sets_per_batch, &mut rng)
         .into_iter()
-        .map(|d| v1::Lines {
-            direction: Some(vector(d)),
+        .map(|axis| v1::Lines {
+            direction: Some(vector(axis.direction)),
             random_x: rng.random(),
             random_y: rng.random(),
             random_count: rng.random(),
+            // every line weighs the same: a direction of larger weight has more of them
+            line_area_m2: sampling.line_area_m2 / axis.weight,
         })
         .collect();
     v1::Batch {
         index,
-        line_area_m2: sampling.line_area_m2,
         lines,
         rays: Some(v1::Rays {
             seed: sampling.seed,
             least_samples: sampling.least_samples,
             batches_in_half: sampling.batches / 2,
+            lines_per_m2: sampling.lines_per_m2(),
         }),
     }
 }
@@ -146,6 +231,7 @@ pub fn block_message(scene: &Scene, world: &World, block: &BlockOf) -> v1::Block
         message.first_element.push(world.elements.first[t]);
         message.divisions.push(world.elements.divisions[t]);
         message.owned.push(owned);
+        message.solid.push(world.solid[t]);
     }
     message.owned_soil_cells.clone_from(&block.soil_cells);
     message

@@ -8,6 +8,7 @@
 
 pub mod direct;
 pub mod exchange;
+pub mod results;
 pub mod solution;
 pub mod solver;
 pub mod world;

@@ -15,6 +15,9 @@ pub struct World {
     pub elements: Elements,
     /// The triangle of each element.
     pub triangle_of_element: Vec<u32>,
+    /// Whether the lower face of each triangle is the inside of something solid: it takes part in
+    /// nothing, and what is buried inside gets and gives no light.
+    pub solid: Vec<bool>,
     /// Where lines run.
     pub extent: Extent,
     /// The numbers of faces, soil cells and so on.
@@ -115,6 +118,12 @@ impl World {
             far_bins: far.1,
         };
         Self {
+            // CAN's opaque organs (leaf 0) are the surfaces of solid stems
+            solid: scene
+                .material
+                .iter()
+                .map(|&m| matches!(scene.materials[m as usize], Material::Stem { .. }))
+                .collect(),
             triangle_of_element: elements.triangle_of_element(),
             extent: Extent {
                 min_m: min,

@@ -25,8 +25,8 @@ pub struct Block {
     /// First local element of each triangle, and their number at the end.
     pub(crate) first: Vec<u32>,
     pub(crate) divisions: Vec<u32>,
-    /// Number in the scene of each local element.
-    pub(crate) element: Vec<u32>,
+    /// What each local face is seen as: its number in the scene.
+    pub(crate) seen_as: Vec<u32>,
     /// One-sided area of each local element, m².
     pub(crate) area_m2: Vec<f64>,
     /// Row of each local face and of each soil cell, or [`NO_ROW`].
@@ -94,6 +94,7 @@ impl Block {
         same_length("vertex coordinates", block.vertices_m.len(), 9 * count)?;
         same_length("first elements", block.first_element.len(), count)?;
         same_length("owner flags", block.owned.len(), count)?;
+        same_length("solid flags", block.solid.len(), count)?;
         require(block.vertices_m.iter().all(|x| x.is_finite()), "vertices_m")?;
         let triangles: Vec<[DVec3; 3]> = block
             .vertices_m
@@ -102,7 +103,7 @@ impl Block {
             .collect();
 
         let mut first = Vec::with_capacity(count + 1);
-        let (mut element, mut area_m2, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut seen_as, mut area_m2, mut row) = (Vec::new(), Vec::new(), Vec::new());
         let mut rows = 0;
         let mut next = 0;
         for (t, &n) in block.divisions.iter().enumerate() {
@@ -116,18 +117,20 @@ impl Block {
                 "first_element",
             )?;
             next = start + n * n;
-            first.push(element.len() as u32);
-            element.extend(start..next);
-            area_m2.extend(std::iter::repeat_n(
-                geometry::area(&triangles[t]) / f64::from(n * n),
-                (n * n) as usize,
-            ));
-            for _ in 0..2 * n * n {
-                row.push(if block.owned[t] { rows } else { NO_ROW });
-                rows += u32::from(block.owned[t]);
+            first.push(area_m2.len() as u32);
+            let area = geometry::area(&triangles[t]) / f64::from(n * n);
+            for e in start..next {
+                area_m2.push(area);
+                let inside = block.solid[t];
+                seen_as.extend([2 * e, if inside { ends.buried() } else { 2 * e + 1 }]);
+                for has_row in [block.owned[t], block.owned[t] && !inside] {
+                    row.push(if has_row { rows } else { NO_ROW });
+                    // every face of an owned triangle has its place in the result
+                    rows += u32::from(block.owned[t]);
+                }
             }
         }
-        first.push(element.len() as u32);
+        first.push(area_m2.len() as u32);
         let cells_at = row.len();
         row.resize(cells_at + soil_cells as usize, NO_ROW);
         for &cell in &block.owned_soil_cells {
@@ -147,7 +150,7 @@ impl Block {
             triangles,
             first,
             divisions: block.divisions.clone(),
-            element,
+            seen_as,
             area_m2,
             row,
             rows: rows as usize,
@@ -156,7 +159,7 @@ impl Block {
 
     /// Faces of local elements; local ends from here on are not faces.
     pub(crate) fn local_faces(&self) -> u32 {
-        2 * self.element.len() as u32
+        self.seen_as.len() as u32
     }
 
     /// The local number of an end that is not a face.
@@ -166,8 +169,8 @@ impl Block {
 
     /// The number in the scene of a local end.
     pub(crate) fn global(&self, local: u32) -> u32 {
-        match self.element.get(local as usize / 2) {
-            Some(element) => 2 * element + local % 2,
+        match self.seen_as.get(local as usize) {
+            Some(&end) => end,
             None => local - self.local_faces() + self.ends.faces(),
         }
     }

@@ -15,14 +15,18 @@
 //! of over-relaxation holds exactly (Young 1971; Hageman & Young 1981, chapter 9).
 
 mod relaxation;
+mod spread;
 mod sweep;
 
 use nestrad_common::problem::Problem;
 use thiserror::Error;
 
-use crate::exchange::Exchange;
+use crate::exchange::{Exchange, Outlook};
 use crate::world::World;
-pub use sweep::Gather;
+use sweep::Gather;
+
+/// Values per band of a group of `N` bands.
+type Lane<const N: usize> = [f64; N];
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -64,6 +68,11 @@ pub struct Irradiance {
     pub passes: u32,
     /// Estimated remaining change of absorbed power relative to incoming, per band.
     pub left: Vec<f64>,
+    /// Variance of absorbed power that the sampling of the exchange leaves, W², indexed
+    /// `element * bands + band`.
+    pub element_variance_W2: Vec<f64>,
+    /// The same per organ, `organ * bands + band`.
+    pub organ_variance_W2: Vec<f64>,
 }
 
 impl Irradiance {
@@ -74,7 +83,7 @@ impl Irradiance {
     }
 }
 
-/// Solves for the irradiance of all rows in the given bands.
+/// Solves for the irradiance of all rows, of the part of them that is not buried, in the given bands.
 ///
 /// `direct_W_m2`: E0, indexed `row * all bands + band`. `fixed_W_m2`: radiosity of the ends that are
 /// not rows (sky, void, outer soil, far field), indexed `(end - rows) * all bands + band`.
@@ -82,6 +91,7 @@ pub fn solve(
     problem: &Problem,
     world: &World,
     exchange: &Exchange,
+    outlook: &Outlook,
     direct_W_m2: &[f64],
     fixed_W_m2: &[f64],
     bands: &[usize],
@@ -96,7 +106,14 @@ pub fn solve(
         bands: bands.len(),
         passes: 0,
         left: vec![0.0; bands.len()],
+        element_variance_W2: vec![0.0; world.elements.len() * bands.len()],
+        organ_variance_W2: vec![0.0; problem.scene.organs.len() * bands.len()],
     };
+    let organ_of_element: Vec<u32> = world
+        .triangle_of_element
+        .iter()
+        .map(|&t| problem.scene.organ[t as usize])
+        .collect();
     let mut done = 0;
     while done < bands.len() {
         let group = &bands[done..(done + WIDEST).min(bands.len())];
@@ -104,11 +121,13 @@ pub fn solve(
             problem,
             world,
             exchange,
+            outlook,
             direct_W_m2,
             fixed_W_m2,
             bands: group,
             incoming_W,
             tolerance,
+            organ_of_element: &organ_of_element,
         };
         match group.len() {
             1 => part.solve::<1>(done, &mut all)?,
@@ -128,11 +147,13 @@ struct Group<'a> {
     problem: &'a Problem,
     world: &'a World,
     exchange: &'a Exchange,
+    outlook: &'a Outlook,
     direct_W_m2: &'a [f64],
     fixed_W_m2: &'a [f64],
     bands: &'a [usize],
     incoming_W: &'a [f64],
     tolerance: &'a Tolerance,
+    organ_of_element: &'a [u32],
 }
 
 impl Group<'_> {
@@ -144,8 +165,12 @@ impl Group<'_> {
                 .map(|v| std::array::from_fn(|k| self.bands.get(k).map_or(0.0, |&b| v[b])))
                 .collect()
         };
-        let gather = Gather::<N>::new(self.problem, self.world, self.bands);
-        let direct = lanes(self.direct_W_m2);
+        let gather = Gather::<N>::new(self.problem, self.world, self.outlook, self.bands);
+        // an element that is partly buried has its light on the rest of it
+        let mut direct = lanes(self.direct_W_m2);
+        for (lane, &exposed) in direct.iter_mut().zip(&self.outlook.exposed) {
+            *lane = lane.map(|e| if exposed > 0.0 { e / exposed } else { 0.0 });
+        }
         let fixed = lanes(self.fixed_W_m2);
         let (a, b) = self
             .exchange
@@ -159,8 +184,8 @@ impl Group<'_> {
         let mut passes = 0;
         while passes < self.tolerance.most_passes {
             let omega = relaxation.map(|r| r.omega);
-            let from_a = gather.sweep(a, &y.radiosity, &direct, &omega, &mut x);
-            let from_b = gather.sweep(b, &x.radiosity, &direct, &omega, &mut y);
+            let from_a = gather.sweep(0, a, &y.radiosity, &direct, &omega, &mut x);
+            let from_b = gather.sweep(1, b, &x.radiosity, &direct, &omega, &mut y);
             passes += 1;
             for (k, left) in left.iter_mut().enumerate() {
                 let incoming = self.incoming_W[self.bands[k]].max(f64::MIN_POSITIVE);
@@ -171,7 +196,7 @@ impl Group<'_> {
             }
         }
         for (k, &l) in left.iter().enumerate() {
-            if !(l <= self.tolerance.absorbed) {
+            if l > self.tolerance.absorbed || l.is_nan() {
                 return Err(SolveError::NotConverged {
                     band: self.problem.bands[self.bands[k]].name.clone(),
                     passes,
@@ -186,6 +211,25 @@ impl Group<'_> {
             for (row, lane) in from.irradiance.iter().enumerate() {
                 for k in 0..self.bands.len() {
                     half[row * all.bands + first + k] = lane[k];
+                }
+            }
+        }
+        let organs = self.problem.scene.organs.len();
+        for (batches, seen) in [(a, &y.radiosity), (b, &x.radiosity)] {
+            let spread = gather.spread(batches, seen, self.organ_of_element, organs);
+            for k in 0..self.bands.len() {
+                // the result is the mean of both halves
+                for (e, v) in spread.element_W2.iter().enumerate() {
+                    all.element_variance_W2[e * all.bands + first + k] += 0.25 * v[k];
+                }
+                for (o, pulls) in spread
+                    .organ_W
+                    .chunks_exact(batches.len().max(1))
+                    .enumerate()
+                {
+                    let squares: f64 = pulls.iter().map(|p| p[k] * p[k]).sum();
+                    all.organ_variance_W2[o * all.bands + first + k] +=
+                        0.25 * spread::unbias(batches.len()) * squares;
                 }
             }
         }

@@ -3,14 +3,12 @@
 use nestrad_common::problem::Problem;
 use rayon::prelude::*;
 
-use crate::exchange::BatchRows;
+use super::Lane;
+use crate::exchange::{BatchRows, Outlook};
 use crate::world::World;
 
 /// Elements that are worked off as one task; a fixed number, so that sums have a fixed order.
 const TASK: usize = 512;
-
-/// Values per band of a group of `N` bands.
-pub type Lane<const N: usize> = [f64; N];
 
 /// What a material does, per band of the group.
 #[derive(Clone, Copy, Debug)]
@@ -25,10 +23,11 @@ struct Scatter<const N: usize> {
 
 /// Gathers and scatters for a group of `N` bands.
 pub struct Gather<'a, const N: usize> {
-    world: &'a World,
+    pub(super) world: &'a World,
     materials: Vec<Scatter<N>>,
     material_of_element: Vec<u32>,
     soil_albedo: Lane<N>,
+    pub(super) outlook: &'a Outlook,
 }
 
 /// Irradiance of all rows and radiosity of all ends, in one half.
@@ -42,7 +41,7 @@ pub struct Half<const N: usize> {
 
 impl<'a, const N: usize> Gather<'a, N> {
     /// Prepares the bands with these numbers (at most `N`; the rest are black).
-    pub fn new(problem: &Problem, world: &'a World, bands: &[usize]) -> Self {
+    pub fn new(problem: &Problem, world: &'a World, outlook: &'a Outlook, bands: &[usize]) -> Self {
         let lane = |value: &dyn Fn(usize) -> f64| {
             std::array::from_fn(|k| bands.get(k).map_or(0.0, |&b| value(b)))
         };
@@ -69,6 +68,7 @@ impl<'a, const N: usize> Gather<'a, N> {
             materials,
             material_of_element,
             soil_albedo: lane(&|b| problem.bands[b].soil_albedo),
+            outlook,
         }
     }
 
@@ -99,6 +99,7 @@ impl<'a, const N: usize> Gather<'a, N> {
     /// Returns how much the absorbed power changed, per band, summed without regard to sign, W.
     pub fn sweep(
         &self,
+        half: usize,
         batches: &[BatchRows],
         seen: &[Lane<N>],
         direct: &[Lane<N>],
@@ -111,7 +112,7 @@ impl<'a, const N: usize> Gather<'a, N> {
         let soil_radiosity = &mut rest[..rows - faces];
 
         let relaxed = |row: usize, old: &Lane<N>| -> (Lane<N>, Lane<N>) {
-            let gathered = gather(batches, seen, row);
+            let gathered = gather(batches, seen, row, self.outlook.weight[half][row]);
             let step: Lane<N> =
                 std::array::from_fn(|k| omega[k] * (direct[row][k] + gathered[k] - old[k]));
             (std::array::from_fn(|k| old[k] + step[k]), step)
@@ -131,12 +132,11 @@ impl<'a, const N: usize> Gather<'a, N> {
                     let (upper, up_step) = relaxed(2 * element, &pair[0]);
                     let (lower, low_step) = relaxed(2 * element + 1, &pair[1]);
                     (pair[0], pair[1]) = (upper, lower);
-                    let m = &self.materials[self.material_of_element[element] as usize];
-                    let area = self.world.elements.area_m2[element];
+                    let [up_area, low_area] =
+                        [0, 1].map(|side| self.absorbing_area_m2(element, side));
                     for b in 0..N {
-                        change[b] += area
-                            * (m.absorbed_upper[b] * up_step[b].abs()
-                                + m.absorbed_lower[b] * low_step[b].abs());
+                        change[b] +=
+                            up_area[b] * up_step[b].abs() + low_area[b] * low_step[b].abs();
                     }
                     let [upper, lower] = self.scattered(element, &pair[0], &pair[1]);
                     (out[0], out[1]) = (upper, lower);
@@ -168,6 +168,18 @@ impl<'a, const N: usize> Gather<'a, N> {
             .fold([0.0; N], |sum, c| std::array::from_fn(|b| sum[b] + c[b]))
     }
 
+    /// Area that is not buried, times absorptance of a face, m², per band.
+    pub(super) fn absorbing_area_m2(&self, element: usize, side: usize) -> Lane<N> {
+        let m = &self.materials[self.material_of_element[element] as usize];
+        let absorbed = if side == 0 {
+            &m.absorbed_upper
+        } else {
+            &m.absorbed_lower
+        };
+        let area = self.world.elements.area_m2[element] * self.outlook.exposed[2 * element + side];
+        absorbed.map(|a| a * area)
+    }
+
     /// What the upper and the lower face of an element send out (DESIGN: section 2).
     #[inline]
     fn scattered(&self, element: usize, upper: &Lane<N>, lower: &Lane<N>) -> [Lane<N>; 2] {
@@ -180,21 +192,22 @@ impl<'a, const N: usize> Gather<'a, N> {
 }
 
 /// Mean radiosity of what a row sees, over all its lines: the irradiance that they bring. All
-/// entries weigh the same, so this is a plain mean (zero for a row that sees nothing at all).
+/// entries weigh the same, so this is a plain mean; what is buried is dark and is not in the weight.
 #[inline]
-fn gather<const N: usize>(batches: &[BatchRows], seen: &[Lane<N>], row: usize) -> Lane<N> {
+fn gather<const N: usize>(
+    batches: &[BatchRows],
+    seen: &[Lane<N>],
+    row: usize,
+    weight: f64,
+) -> Lane<N> {
     let mut sum = [0.0; N];
-    let mut count = 0usize;
     for batch in batches {
-        let ends = batch.row(row);
-        count += ends.len();
-        for &end in ends {
+        for &end in batch.row(row) {
             let b = &seen[end as usize];
             for k in 0..N {
                 sum[k] += b[k];
             }
         }
     }
-    let weight = if count == 0 { 0.0 } else { 1.0 / count as f64 };
     sum.map(|s| s * weight)
 }

@@ -17,7 +17,7 @@ pub(crate) fn trace(block: &Block, batch: &v1::Batch) -> Traced {
     let (lines, pairs): (Vec<u64>, Vec<Vec<Pair>>) = batch
         .lines
         .par_iter()
-        .map(|lines| direction(block, batch.line_area_m2, lines))
+        .map(|lines| direction(block, lines))
         .unzip();
     Traced {
         pairs,
@@ -26,7 +26,7 @@ pub(crate) fn trace(block: &Block, batch: &v1::Batch) -> Traced {
     }
 }
 
-fn direction(block: &Block, line_area_m2: f64, lines: &v1::Lines) -> (u64, Vec<Pair>) {
+fn direction(block: &Block, lines: &v1::Lines) -> (u64, Vec<Pair>) {
     let Some(d) = &lines.direction else {
         return (0, Vec::new());
     };
@@ -34,7 +34,7 @@ fn direction(block: &Block, line_area_m2: f64, lines: &v1::Lines) -> (u64, Vec<P
     let lattice = Lattice::new(
         DVec3::new(d.x, d.y, d.z),
         &block.extent,
-        line_area_m2,
+        lines.line_area_m2,
         random,
     );
     let mut pairs = Vec::new();

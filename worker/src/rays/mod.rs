@@ -25,8 +25,6 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced
     let plan = Plan {
         rays,
         batch: batch.index,
-        lines_per_m2: 0.5 * batch.lines.len() as f64 * f64::from(rays.batches_in_half)
-            / batch.line_area_m2,
     };
     let tasks = block.triangles.len().div_ceil(TASK);
     let looks: Vec<Vec<Pair>> = (0..tasks)
@@ -46,15 +44,12 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced
 struct Plan<'a> {
     rays: &'a v1::Rays,
     batch: u32,
-    /// Lines of a half that meet a square metre of leaf, on average over its inclination: a line
-    /// sees |cos| of the area, whose mean over the hemisphere is 1/2.
-    lines_per_m2: f64,
 }
 
 impl Plan<'_> {
     /// Rays in this batch for a face of that area: those of the half are dealt out in turn.
     fn rays_of(&self, area_m2: f64, face: u32) -> u32 {
-        let missing = (self.rays.least_samples - area_m2 * self.lines_per_m2)
+        let missing = (self.rays.least_samples - area_m2 * self.rays.lines_per_m2)
             .ceil()
             .max(0.0) as u32;
         let batches = self.rays.batches_in_half.max(1);

@@ -209,7 +209,7 @@ pub(crate) struct FaceRay {
 /// What is seen when no triangle is hit within reach.
 fn beyond(block: &Block, origin: DVec3, direction: DVec3, soil_t: f64, random: f64) -> u32 {
     let ends = &block.ends;
-    if soil_t <= block.radius_m {
+    if soil_t.is_finite() && soil_t <= block.radius_m {
         let at = origin + soil_t * direction;
         return block.local(soil_cell(block, at).map_or(ends.outer_soil(), |c| ends.soil(c)));
     }
