@@ -9,6 +9,8 @@ mod error;
 pub mod light;
 mod lines;
 mod mesh;
+#[cfg(test)]
+mod mutation_tests;
 pub mod obj;
 pub mod opt;
 pub mod pattern;
