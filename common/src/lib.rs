@@ -9,9 +9,15 @@
 )]
 
 pub mod assemble;
+pub mod directions;
+pub mod elements;
+pub mod ends;
 pub mod formats;
+pub mod generate;
+pub mod geometry;
 pub mod inputs;
 pub mod inspection;
+pub mod lattice;
 pub mod light;
 pub mod optics;
 pub mod options;

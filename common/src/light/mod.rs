@@ -1,6 +1,8 @@
 //! Light that falls on the canopy: a list of parallel sources.
 
+pub mod sky;
 mod spec;
+pub mod sun;
 
 use glam::DVec3;
 
