@@ -51,7 +51,6 @@ fn sample_scenes_have_the_organs_and_areas_of_the_reference() {
             inspection,
             ..
         } = rows(&folder, name, soil);
-        eprintln!("{name}: {inspection:#?}");
         assert_eq!(inspection.triangles, triangles);
         assert_eq!(inspection.plants, 8);
         assert!((inspection.area_index.unwrap() - area_index).abs() < 0.06);

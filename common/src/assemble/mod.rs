@@ -4,6 +4,8 @@ mod bands;
 mod error;
 mod geometry;
 mod lights;
+#[cfg(test)]
+mod tests;
 
 use std::path::Path;
 

@@ -137,3 +137,166 @@ impl Groups {
         indices
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const LEAF: &str = "p 1 200007003001 3 0 0 1 1 0 1 0 1 1\n";
+
+    fn parsed(text: &str) -> Mesh {
+        parse("a.can", text.as_bytes()).unwrap()
+    }
+
+    fn refusal(bytes: impl AsRef<[u8]>) -> String {
+        parse("a.can", bytes.as_ref()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn labels_are_read_from_the_right() {
+        for (label, id, plant, material) in [
+            ("100001000001", "1000", "1", Material::Stem { species: 1 }),
+            (
+                "1299999123001",
+                "99999123",
+                "99999",
+                Material::Leaf { species: 12 },
+            ),
+            ("000000000000", "0", "0", Material::Soil),
+            ("0", "0", "0", Material::Soil),
+            ("000012000034", "0", "0", Material::Soil),
+        ] {
+            let mesh = parsed(&LEAF.replace("200007003001", label));
+            assert_eq!(mesh.organs[0].id, id, "{label}");
+            assert_eq!(mesh.organs[0].plant, plant, "{label}");
+            assert_eq!(mesh.materials, [material], "{label}");
+        }
+        for label in [
+            "100001x00001",
+            "-1",
+            "1e11",
+            "99999999999999999999999",
+            "1001000",
+        ] {
+            let line = LEAF.replace("200007003001", label);
+            assert!(refusal(line).starts_with("a.can, line 1: expected a label of digits"));
+        }
+    }
+
+    #[test]
+    fn triangles_of_a_leaf_share_an_organ_and_the_first_label_counts() {
+        let text = "# plant\n\np 2 100001001001 77 3 0 0 0 1 0 0 0 1 0 # first\n\
+                    p 1 100001002001 3 0 0 0 1 0 0 0 1 0\n\
+                    p 1 100001001002 3 0 0 1 1 0 1 0 1 1\n";
+        let mesh = parsed(text);
+        assert_eq!(mesh.organ, [0, 1, 0]);
+        assert_eq!(mesh.material, [0, 0, 0]);
+        assert_eq!(mesh.line, [3, 4, 5]);
+    }
+
+    #[test]
+    fn polygons_are_split_and_keep_their_sides() {
+        let mesh = parsed("p 1 100001001001 5 0 0 0 2 0 0 3 1 0 1 2 0 -1 1 0\n");
+        assert_eq!(mesh.triangles.len(), 3);
+        for [a, b, c] in &mesh.triangles {
+            assert!((b - a).cross(c - a).z > 0.0);
+        }
+        assert_eq!((mesh.organ, mesh.line), (vec![0; 3], vec![1; 3]));
+    }
+
+    #[test]
+    fn line_ends_of_all_systems_and_a_byte_order_mark_are_read() {
+        let plain = parsed(&LEAF.repeat(2));
+        assert_eq!(parsed(&LEAF.repeat(2).replace('\n', "\r\n")), plain);
+        assert_eq!(parsed(&format!("\u{feff}{LEAF}{LEAF}")), plain);
+        assert_eq!(parsed(&LEAF.repeat(2).replace(' ', "\t  ")), plain);
+    }
+
+    #[test]
+    fn fault_a_missing_last_newline_is_no_fault() {
+        assert_eq!(parsed(LEAF.trim_end()), parsed(LEAF));
+    }
+
+    #[test]
+    fn fault_a_nan_vertex_is_refused() {
+        for bad in ["nan", "NaN", "inf", "-infinity", "1e999"] {
+            let text = format!("{LEAF}p 1 100001001001 3 0 0 1 1 {bad} 1 0 1 1\n");
+            let expected =
+                format!("a.can, line 2: expected y of vertex 2, a finite number, found '{bad}'");
+            assert_eq!(refusal(text), expected);
+        }
+    }
+
+    #[test]
+    fn fault_a_missing_coordinate_is_refused() {
+        assert_eq!(
+            refusal("p 1 100001001001 3 0 0 1 1 0 1 0 1\n"),
+            "a.can, line 1: expected z of vertex 3, a finite number, found the end of the line"
+        );
+        assert_eq!(
+            refusal("p 1 100001001001 3 0 0 1 1 0 1 0 1 1 5\n"),
+            "a.can, line 1: expected the end of the line, found '5'"
+        );
+    }
+
+    #[test]
+    fn fault_a_long_line_is_refused() {
+        let mut text = LEAF.repeat(3).into_bytes();
+        text.resize(100 << 20, b'7');
+        let error = refusal(text);
+        assert!(error.starts_with("a.can, line 4: expected a line of at most 1048576 bytes"));
+        assert!(error.len() < 200);
+    }
+
+    #[test]
+    fn fault_far_coordinates_are_taken_and_absurd_ones_refused() {
+        let mesh = parsed("p 1 100001001001 3 9e5 0 1 900001 0 1 9e5 1 1\n");
+        assert_eq!(mesh.triangles[0][1].x, 900_001.0);
+        let error = refusal("p 1 100001001001 3 0 0 1 1 0 -2e12 0 1 1\n");
+        assert_eq!(
+            error,
+            "a.can, line 1: expected z of vertex 2 within 1e12 of zero, found '-2e12'"
+        );
+    }
+
+    #[test]
+    fn huge_and_small_counts_are_refused_before_memory_is_taken() {
+        for count in ["18446744073709551615", "10001", "2", "0"] {
+            let error = refusal(format!("p 1 100001001001 {count} 0 0 0\n"));
+            let expected = "a.can, line 1: expected 3 to 10000 vertices, found ";
+            assert_eq!(error, format!("{expected}'{count}'"));
+        }
+        for (labels, expected) in [
+            ("0", "at least 1 label"),
+            ("-1", "a number of labels, a whole number"),
+            ("99999999999999999999", "a number of labels, a whole number"),
+            ("4000000000", "label 12 of 4000000000"),
+        ] {
+            let error = refusal(LEAF.replace("p 1 ", &format!("p {labels} ")));
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn truncated_garbled_and_binary_files_are_refused() {
+        for end in 1..LEAF.trim_end().len() - 1 {
+            refusal(&LEAF[..end]);
+        }
+        assert_eq!(
+            refusal(LEAF.replace("p ", "q ")),
+            "a.can, line 1: expected 'p', found 'q'"
+        );
+        let error = refusal([0x7f, b'E', b'L', b'F', 0, 0, 0xff, b' ', 0x80]);
+        assert_eq!(
+            error,
+            "a.can, line 1: expected 'p', found '\\u{7f}ELF\\0\\0\u{fffd}'"
+        );
+    }
+
+    #[test]
+    fn a_file_of_nothing_is_an_empty_mesh() {
+        for text in ["", "\n\n", "# nothing\n"] {
+            assert!(parsed(text).triangles.is_empty());
+        }
+    }
+}

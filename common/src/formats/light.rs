@@ -62,3 +62,82 @@ fn source(fields: &mut Fields<'_>) -> Result<LightSource, FormatError> {
         direction,
     })
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refusal(text: &str) -> String {
+        parse("a.light", text.as_bytes()).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn directions_become_unit_vectors() {
+        let text = "# sun\n\n400 0 0 -2\r\n0 3 0 -4 # dark\n1 1e300 0 -1e300\n1 0 1e-300 -1e-300";
+        let sources = parse("a.light", text.as_bytes()).unwrap();
+        assert_eq!(sources.len(), 4);
+        assert_eq!(sources[0].direction, DVec3::NEG_Z);
+        assert_eq!(sources[0].irradiance_W_m2, 400.0);
+        let expected = DVec3::new(0.6, 0.0, -0.8);
+        assert!(sources[1].direction.abs_diff_eq(expected, 1e-15));
+        for source in sources {
+            assert!((source.direction.length() - 1.0).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn sources_that_do_not_come_from_above_are_refused() {
+        for direction in [
+            "0 0 1",
+            "1 0 0",
+            "1 1 0.0001",
+            "0 0 0",
+            "-0 0 -0",
+            "1 0 -1e-9",
+        ] {
+            let error = refusal(&format!("1 0 0 -1\n2 {direction}\n"));
+            let expected = "a.light, line 2: expected a direction of travel that points down";
+            assert!(error.starts_with(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_light_is_refused() {
+        for (text, expected) in [
+            (
+                "",
+                "a.light, line 1: expected at least one source, found the end of the file",
+            ),
+            (
+                "\n#\n",
+                "a.light, line 2: expected at least one source, found the end of the file",
+            ),
+            (
+                "-1 0 0 -1",
+                "a.light, line 1: expected an irradiance of at least 0, found -1",
+            ),
+            (
+                "nan 0 0 -1",
+                "a.light, line 1: expected an irradiance, a finite number, found 'nan'",
+            ),
+            (
+                "1 0 0",
+                "a.light, line 1: expected z of the direction of travel, a finite number, found the end of the line",
+            ),
+            (
+                "1 0 0 -1 9",
+                "a.light, line 1: expected the end of the line, found '9'",
+            ),
+            (
+                "1 0 inf -1",
+                "a.light, line 1: expected y of the direction of travel, a finite number, found 'inf'",
+            ),
+            (
+                "\u{1}\0",
+                "a.light, line 1: expected an irradiance, a finite number, found '\\u{1}\\0'",
+            ),
+        ] {
+            assert_eq!(refusal(text), expected);
+        }
+    }
+}

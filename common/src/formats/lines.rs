@@ -59,10 +59,15 @@ impl<'a> Lines<'a> {
         Ok(None)
     }
 
+    /// The line that was read last.
+    pub(super) fn place(&self) -> Place {
+        Place::line(self.file, self.number.max(1))
+    }
+
     /// The error for a file that ends, as a whole, without what it must have.
     pub(super) fn missing(&self, expected: impl Display) -> FormatError {
         FormatError::Content {
-            place: Place::line(self.file, self.number.max(1)),
+            place: self.place(),
             expected: expected.to_string(),
             found: "the end of the file".to_owned(),
         }

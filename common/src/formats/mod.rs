@@ -1,14 +1,16 @@
 //! The files that a user brings, one module per format.
 //!
 //! Parsers take the bytes of a file and the name to give it in messages; only [`read`] touches the
-//! file system. No parser panics or allocates more than a small multiple of its input, whatever the
-//! bytes are; every error says where it is, what was expected and what was found.
+//! file system. Whatever the bytes are, no parser panics, and the memory it takes is in
+//! proportion to its input; every error says where it is, what was expected and what was found.
 
 pub mod can;
 mod error;
 pub mod light;
 mod lines;
 mod mesh;
+#[cfg(test)]
+mod mutation_tests;
 pub mod obj;
 pub mod opt;
 pub mod pattern;

@@ -135,3 +135,110 @@ fn resolve(field: &[u8], vertices: &[DVec3]) -> Option<DVec3> {
     };
     vertices.get(index).copied()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SQUARE: &str = "v 0 0 1\nv 1 0 1\nv 1 1 1 0.5 0.5 0.5\nv 0 1 1\n";
+
+    fn parsed(faces: &str) -> Result<Mesh, String> {
+        let text = format!("{SQUARE}{faces}");
+        parse("a.obj", text.as_bytes()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn all_ways_to_name_a_vertex_mean_the_same() {
+        let expected = parsed("f 1 2 3 4").unwrap();
+        assert_eq!(expected.triangles.len(), 2);
+        for face in [
+            "f 1/1 2/2 3/3 4/4",
+            "f 1//7 2//7 3//7 4//7",
+            "f 1/1/1 2/1/1 3/1/1 4/1/1",
+            "f -4 -3 -2 -1",
+        ] {
+            assert_eq!(parsed(face).unwrap().triangles, expected.triangles);
+        }
+    }
+
+    #[test]
+    fn groups_are_organs_objects_are_plants_and_materials_have_names() {
+        let faces = "mtllib a.mtl\nvn 0 0 1\ns off\nf 1 2 3\n\
+                     o oak\nusemtl bark\nf 1 2 3\ng leaf one\nusemtl leaf\nf 1 2 3\nf 2 3 4\n\
+                     o elm\nf 1 2 3\ng leaf one\nf 1 2 3\n";
+        let mesh = parsed(faces).unwrap();
+        let organs: Vec<(&str, &str)> = mesh
+            .organs
+            .iter()
+            .map(|organ| (organ.plant.as_str(), organ.id.as_str()))
+            .collect();
+        assert_eq!(
+            organs,
+            [
+                ("default", "default"),
+                ("oak", "oak"),
+                ("oak", "leaf one"),
+                ("elm", "elm"),
+                ("elm", "leaf one")
+            ]
+        );
+        assert_eq!(mesh.organ, [0, 1, 2, 2, 3, 4]);
+        let names = ["default", "bark", "leaf"];
+        assert_eq!(
+            mesh.materials,
+            names.map(|name| Material::Named(name.into()))
+        );
+        assert_eq!(mesh.material, [0, 1, 2, 2, 2, 2]);
+    }
+
+    #[test]
+    fn faces_without_their_vertices_are_refused() {
+        for face in [
+            "f 1 2 5",
+            "f 0 1 2",
+            "f -5 1 2",
+            "f 1 2 x",
+            "f 1 2 99999999999999999999",
+        ] {
+            let error = parsed(face).unwrap_err();
+            let expected = "a.obj, line 5: expected a vertex from 1 to 4, or from -4 to -1, found ";
+            assert!(error.starts_with(expected), "{error}");
+        }
+        assert_eq!(
+            parsed("f 1 2\n").unwrap_err(),
+            "a.obj, line 5: expected at least 3 vertices, found the end of the line"
+        );
+    }
+
+    #[test]
+    fn garbled_files_are_refused() {
+        for (text, expected) in [
+            (
+                "v 0 0\n",
+                "line 5: expected z of vertex 5, a finite number, found the end of the line",
+            ),
+            (
+                "v 0 nan 0\n",
+                "line 5: expected y of vertex 5, a finite number, found 'nan'",
+            ),
+            (
+                "<html>\n",
+                "line 5: expected an OBJ statement (v, f, g, o, usemtl, ...), found '<html>'",
+            ),
+        ] {
+            assert_eq!(parsed(text).unwrap_err(), format!("a.obj, {expected}"));
+        }
+        assert!(parse("a.obj", b"o \xff\xfe\n").is_err());
+    }
+
+    #[test]
+    fn long_names_cannot_fill_the_memory() {
+        let name = "x".repeat(256);
+        assert!(
+            parsed(&format!("o {name}\n"))
+                .unwrap_err()
+                .contains("at most 255 bytes")
+        );
+        assert!(parsed(&format!("o {}\nf 1 2 3", &name[1..])).is_ok());
+    }
+}

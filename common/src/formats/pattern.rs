@@ -61,3 +61,62 @@ pub(super) fn refused(place: Place, corners: [f64; 4]) -> FormatError {
         found: corners.map(|value| value.to_string()).join(" "),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parsed(text: &str) -> Result<Rectangle, String> {
+        parse("a.8", text.as_bytes()).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn corners_come_in_any_order_and_layout() {
+        let expected = parsed("-0.4 -0.75\n0.4 0.75\n").unwrap();
+        assert_eq!(expected.min, DVec2::new(-0.4, -0.75));
+        assert_eq!(expected.max, DVec2::new(0.4, 0.75));
+        for text in [
+            "0.4 0.75\r\n-0.4 -0.75",
+            "-0.4 0.75\n0.4 -0.75",
+            "# rows\n0.4 -0.75 -0.4 0.75 # m\n\n",
+        ] {
+            assert_eq!(parsed(text).unwrap(), expected);
+        }
+    }
+
+    #[test]
+    fn patterns_without_area_are_refused() {
+        for text in [
+            "0 0\n0 1\n",
+            "0 1\n5 1\n",
+            "1 1 1 1",
+            "0 0\n1e-320 1",
+            "0 0\n2e12 1",
+        ] {
+            let error = parsed(text).unwrap_err();
+            assert!(
+                error.contains("expected corners 1e-9 or more apart"),
+                "{error}"
+            );
+        }
+        assert_eq!(
+            parsed("0 0\nNaN 1\n").unwrap_err(),
+            "a.8, line 2: expected a coordinate of a corner, a finite number, found 'NaN'"
+        );
+    }
+
+    #[test]
+    fn too_few_or_too_many_corners_are_refused() {
+        for text in ["", "0 0", "0 0\n1\n"] {
+            assert!(
+                parsed(text)
+                    .unwrap_err()
+                    .contains("expected two corners of the pattern")
+            );
+        }
+        assert_eq!(
+            parsed("0 0\n1 1\n2 2\n").unwrap_err(),
+            "a.8, line 3: expected the end of the line, found '2'"
+        );
+    }
+}

@@ -55,3 +55,78 @@ fn up_to(source: impl Read, limit: u64, what: &str) -> io::Result<Vec<u8>> {
     }
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use super::*;
+
+    fn gzip(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+        encoder.write_all(bytes).unwrap();
+        encoder.finish().unwrap()
+    }
+
+    #[test]
+    fn gzip_is_known_by_its_bytes_not_by_its_name() {
+        let folder = tempfile::tempdir().unwrap();
+        for (name, bytes) in [
+            ("packed.can", gzip(b"text")),
+            ("plain.can.gz", b"text".to_vec()),
+            ("members.gz", [gzip(b"te"), gzip(b"xt")].concat()),
+        ] {
+            let path = folder.path().join(name);
+            std::fs::write(&path, bytes).unwrap();
+            assert_eq!(read(&path, 100).unwrap(), b"text");
+        }
+    }
+
+    #[test]
+    fn files_that_cannot_be_read_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let missing = folder.path().join("no.can");
+        for path in [missing.as_path(), folder.path()] {
+            let error = read(path, 100).unwrap_err().to_string();
+            let expected = format!("{}: cannot be read: ", path.display());
+            assert!(error.starts_with(&expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn truncated_and_garbled_gzip_is_refused() {
+        let whole = gzip(b"p 1 100001001001 3 0 0 1 1 0 1 0 1 1\n");
+        for end in 2..whole.len() {
+            assert!(gunzip(whole[..end].to_vec(), 1000).is_err(), "{end}");
+        }
+        let mut garbled = whole.clone();
+        garbled[20] ^= 0x55;
+        assert!(gunzip(garbled, 1000).is_err());
+        assert!(gunzip([whole, b"rest".to_vec()].concat(), 1000).is_err());
+    }
+
+    #[test]
+    fn what_is_too_large_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("large");
+        std::fs::write(&path, [b'x'; 101]).unwrap();
+        let error = read(&path, 100).unwrap_err().to_string();
+        assert!(
+            error.ends_with("the file is larger than 100 bytes"),
+            "{error}"
+        );
+        let error = gunzip(gzip(&[0; 1001]), 1000).unwrap_err().to_string();
+        assert_eq!(error, "the unpacked file is larger than 1000 bytes");
+    }
+
+    #[test]
+    fn a_gzip_bomb_is_stopped_long_before_the_limit_of_the_file() {
+        let bomb = gzip(&vec![b'\n'; 100 << 20]);
+        assert!(bomb.len() < 600_000);
+        let error = gunzip(bomb, MAX_GEOMETRY_BYTES).unwrap_err().to_string();
+        assert_eq!(error, "the unpacked file is larger than 67108864 bytes");
+    }
+}

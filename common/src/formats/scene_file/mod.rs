@@ -29,6 +29,8 @@
 
 mod checks;
 mod tables;
+#[cfg(test)]
+mod tests;
 
 use std::fmt::Display;
 use std::ops::Range;

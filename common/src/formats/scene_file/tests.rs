@@ -1,0 +1,245 @@
+//! Scene files, good and bad.
+
+use super::*;
+use crate::inputs::{LightInput, PatternInput};
+use crate::light::Sky;
+use crate::optics::LeafOptics;
+use crate::options::{Diameter, TableFormat, Unit};
+
+const WHOLE: &str = r#"
+scene = ["maize.can.gz", "/abs/soil.obj"]
+unit = "cm"
+pattern = [-40, -75, 40, 75.5]
+soil = -0.2
+light = "clear.light"
+
+[[bands]]
+name = "PAR"
+optics = "par.opt"
+
+[[bands]]
+name = "NIR"
+soil_albedo = 0.25
+[bands.materials]
+bark = { rho = 0.4 }
+leaf = { upper = { rho = 0.44, tau = 0.45 }, lower = { rho = 0.46, tau = 0.44 } }
+
+[options]
+diameter = 0.4
+accuracy_percent = 0.5
+memory_GiB = 2
+threads = 2
+seed = 7
+format = "parquet"
+vtp = true
+"#;
+
+fn parsed(text: &str) -> Inputs {
+    parse("a.toml", text.as_bytes(), Path::new("dir")).unwrap()
+}
+
+fn refusal(text: &str) -> String {
+    parse("a.toml", text.as_bytes(), Path::new("dir"))
+        .unwrap_err()
+        .to_string()
+}
+
+#[test]
+fn everything_can_be_said() {
+    let inputs = parsed(WHOLE);
+    let paths: Vec<_> = inputs.scenes.iter().map(|path| path.to_str()).collect();
+    assert_eq!(paths, [Some("dir/maize.can.gz"), Some("/abs/soil.obj")]);
+    assert_eq!(inputs.unit, Some(Unit::Centimetre));
+    let corners = PatternInput::Corners([-40.0, -75.0, 40.0, 75.5]);
+    assert_eq!(inputs.pattern, Some(corners));
+    assert_eq!(inputs.soil, Some(-0.2));
+    assert_eq!(
+        inputs.light,
+        Some(LightInput::File("dir/clear.light".into()))
+    );
+    assert_eq!(inputs.bands[0].optics, Some("dir/par.opt".into()));
+    assert_eq!(inputs.bands[1].soil_albedo, Some(0.25));
+    assert_eq!(inputs.bands[1].materials["bark"], LeafOptics::opaque(0.4));
+    assert_eq!(inputs.bands[1].materials["leaf"].lower.tau, 0.44);
+    assert_eq!(inputs.bands[1].place, Some(Place::line("a.toml", 12)));
+    let options = inputs.options;
+    assert_eq!(options.diameter, Some(Diameter::Metres(0.4)));
+    assert_eq!(options.accuracy_percent, Some(0.5));
+    assert_eq!(options.memory_GiB, Some(2.0));
+    assert_eq!((options.threads, options.seed), (Some(2), Some(7)));
+    assert_eq!(options.format, Some(TableFormat::Parquet));
+    assert_eq!(options.vtp, Some(true));
+}
+
+#[test]
+fn nothing_has_to_be_said() {
+    assert_eq!(parsed(""), Inputs::default());
+    assert_eq!(parsed("\r\n# nothing\r\n"), Inputs::default());
+}
+
+#[test]
+fn flags_win_over_the_file() {
+    let mut flags = Inputs::default();
+    flags.options.seed = Some(9);
+    flags.unit = Some(Unit::Metre);
+    let both = flags.over(parsed(WHOLE));
+    assert_eq!(both.options.seed, Some(9));
+    assert_eq!(both.options.threads, Some(2));
+    assert_eq!(both.unit, Some(Unit::Metre));
+    assert_eq!(both.bands.len(), 2);
+}
+
+#[test]
+fn light_is_a_file_a_file_per_band_or_a_sky() {
+    let light = |text: &str| parsed(text).light.unwrap();
+    let LightInput::Files(files) = light("[light.files]\nPAR = 'a.light'\nNIR = 'b.light'") else {
+        panic!("expected files")
+    };
+    assert_eq!(files["NIR"], Path::new("dir/b.light"));
+
+    for time in ["2024-06-21T12:00:00Z", "'2024-06-21T12:00:00Z'"] {
+        let text = format!(
+            "[light.sky]\nkind = 'clear'\ntime_utc = {time}\nlatitude_deg = 43.6\n\
+             longitude_deg = 3.9\ndiffuse_fraction = 0.2\nirradiance_W_m2 = {{ PAR = 400 }}"
+        );
+        let LightInput::Sky {
+            sky,
+            irradiance_W_m2,
+        } = light(&text)
+        else {
+            panic!("expected a sky")
+        };
+        let expected = Sky::Clear {
+            time_utc: "2024-06-21T12:00:00Z".into(),
+            latitude_deg: 43.6,
+            longitude_deg: 3.9,
+            diffuse_fraction: 0.2,
+        };
+        assert_eq!(sky, expected);
+        assert_eq!(irradiance_W_m2["PAR"], 400.0);
+
+        let error = refusal(&text.replace("43.6", "95.0"));
+        assert_eq!(
+            error,
+            "a.toml, line 1: latitude_deg: expected -90 to 90, found 95"
+        );
+    }
+}
+
+#[test]
+fn diameters_are_words_or_metres() {
+    let diameter = |text: &str| {
+        parsed(&format!("[options]\ndiameter = {text}"))
+            .options
+            .diameter
+    };
+    assert_eq!(diameter("'auto'"), Some(Diameter::Auto));
+    assert_eq!(diameter("'inf'"), Some(Diameter::Infinite));
+    assert_eq!(diameter("inf"), Some(Diameter::Infinite));
+    assert_eq!(diameter("2"), Some(Diameter::Metres(2.0)));
+    for bad in ["0", "-1", "nan", "'wide'", "[]"] {
+        let error = refusal(&format!("[options]\ndiameter = {bad}"));
+        assert!(
+            error.contains("auto, inf or a number of metres above 0"),
+            "{error}"
+        );
+    }
+}
+
+#[test]
+fn what_is_wrong_is_named_with_its_line() {
+    for (text, expected) in [
+        ("scenes = 'a'\n", "a.toml, line 1: unknown field `scenes`"),
+        (
+            "\nunit = 'inch'\n",
+            "a.toml, line 2: unknown variant `inch`",
+        ),
+        (
+            "\n\nsoil = nan\n",
+            "a.toml, line 3: expected a finite soil height, found NaN",
+        ),
+        ("soil = 1\nsoil = 2\n", "a.toml, line 2: duplicate key"),
+        (
+            "scene = 3\n",
+            "a.toml, line 1: expected a file or a list of files",
+        ),
+        (
+            "pattern = [0, 0, 1]",
+            "a.toml, line 1: expected a file or [x0, y0, x1, y1]",
+        ),
+        (
+            "pattern = [0, 0, 0, 1]",
+            "a.toml, line 1: expected corners 1e-9 or more apart",
+        ),
+        (
+            "light = 3",
+            "a.toml, line 1: invalid type: integer `3`, expected a file, [light.files]",
+        ),
+        (
+            "[light]\n",
+            "a.toml, line 1: expected either [light.files] or [light.sky]",
+        ),
+        (
+            "[light]\nskies = 1\n",
+            "a.toml, line 2: unknown field `skies`",
+        ),
+        (
+            "[light.sky]\nkind = 'grey'\n",
+            "a.toml, line 2: unknown variant `grey`",
+        ),
+        (
+            "[light.sky]\nkind = 'clear'\nirradiance_W_m2 = {}\n",
+            "a.toml, line 1: expected time_utc, latitude_deg",
+        ),
+        (
+            "[light.sky]\nkind = 'uniform_overcast'\nirradiance_W_m2 = { PAR = -1 }\n",
+            "a.toml, line 1: irradiance in band PAR: expected a finite number of at least 0",
+        ),
+        (
+            "[light.sky]\nkind = 'uniform_overcast'\nlatitude_deg = 3\nirradiance_W_m2 = {}\n",
+            "a.toml, line 1: expected nothing but irradiance_W_m2",
+        ),
+        (
+            "[options]\nthreads = -1\n",
+            "a.toml, line 2: invalid value: integer `-1`",
+        ),
+        (
+            "[options]\n\naccuracy_percent = 0\n",
+            "a.toml, line 1: accuracy: expected a number above 0",
+        ),
+        ("[[bands]]\n", "a.toml, line 1: missing field `name`"),
+        (
+            "[[bands]]\nname = 'A'\nsoil_albedo = 1.1\n",
+            "a.toml, line 3: expected an albedo from 0 to 1, found 1.1",
+        ),
+        (
+            "[[bands]]\nname = 'A'\noptics = 'x'\nsoil_albedo = 0.1\n",
+            "a.toml, line 4: expected the albedo of the soil in the optics file or here",
+        ),
+        (
+            "[[bands]]\nname = 'A'\n[bands.materials]\nm = { rho = 0.6, tau = 0.5 }\n",
+            "a.toml, line 4: rho = 0.6 and tau = 0.5: expected rho + tau <= 1",
+        ),
+        (
+            "[[bands]]\nname = 'A'\n[bands.materials]\nm = { rho = 0.6, upper = { rho = 0 } }\n",
+            "a.toml, line 4: expected rho (and tau) of both faces",
+        ),
+    ] {
+        let error = refusal(text);
+        assert!(error.starts_with(expected), "{error}");
+        assert!(!error.contains('\n'));
+    }
+}
+
+#[test]
+fn binary_files_are_refused() {
+    let error = parse("a.toml", b"soil = 1\n\xff", Path::new("")).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "a.toml, line 2: expected UTF-8 text, found other bytes"
+    );
+    assert!(refusal("\0\u{1}").starts_with("a.toml, line 1: "));
+    for opening in ["[", "a = [", "a = {b = "] {
+        refusal(&opening.repeat(100_000));
+    }
+}
