@@ -8,6 +8,9 @@
 //! first rename and the last the new files are mixed with old ones. That is made visible: the *seal*
 //! (`summary.json`) is taken away before the first rename and comes back last. A folder that has its
 //! seal holds one whole result and nothing of another.
+//!
+//! A process that is killed leaves its hidden folder (`.nestrad-` and six letters) behind. It is not
+//! removed by later runs, which cannot tell it from that of a run still at work.
 
 use std::fs::{self, File};
 use std::io::{self, BufWriter, ErrorKind};
@@ -66,7 +69,8 @@ impl Staging {
     /// Puts all files in their places, `seal` last, and removes those of the `stale` names that are
     /// not among them (what an earlier run wrote and this one did not).
     pub fn commit(mut self, seal: &str, stale: &[&str]) -> Result<(), OutputError> {
-        for name in &self.names {
+        let own = self.names.iter().map(String::as_str);
+        for name in own.chain(stale.iter().copied()) {
             let place = self.folder.join(name);
             if place.is_dir() {
                 return Err(OutputError::at(&place, Fault::IsFolder));

@@ -17,6 +17,7 @@ pub mod summary;
 mod table;
 mod tables;
 pub mod terminal;
+mod vtk_xml;
 mod vtp;
 
 use std::path::Path;

@@ -6,12 +6,13 @@
 //! at; the tables hold the figures.
 
 use std::collections::HashMap;
-use std::io::{self, Write};
+use std::io::Write;
 
 use nestrad_common::scene::Scene;
 
 use super::error::Fault;
 use super::tables::triangle_light_per_m2;
+use super::vtk_xml::{Array, Values, Xml, escaped};
 use crate::solution::{ItemLight, Solution};
 
 /// Writes all triangles.
@@ -81,6 +82,9 @@ fn point_array(scene: &Scene) -> Array<'_> {
     points
 }
 
+/// A name with its unit, and the figure.
+type Quantity = (&'static str, fn(ItemLight) -> f64);
+
 fn cell_arrays<'a>(
     scene: &'a Scene,
     band_names: &[&str],
@@ -88,7 +92,7 @@ fn cell_arrays<'a>(
 ) -> Vec<Array<'a>> {
     let triangles = scene.triangles.len();
     let bands = band_names.len();
-    let quantities: [(&str, fn(ItemLight) -> f64); 3] = [
+    let quantities: [Quantity; 3] = [
         ("absorbed_W_m2", |light| light.absorbed_W),
         ("irradiance_upper_W_m2", |light| light.irradiance_upper_W_m2),
         ("irradiance_lower_W_m2", |light| light.irradiance_lower_W_m2),
@@ -127,124 +131,149 @@ fn plant_of_organ(scene: &Scene) -> Vec<u32> {
         .collect()
 }
 
-/// A named array: its values by index.
-struct Array<'a> {
-    name: String,
-    components: usize,
-    count: usize,
-    values: Values<'a>,
-}
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use nestrad_common::scene::Organ;
 
-type ByIndex<'a, T> = Box<dyn Fn(usize) -> T + 'a>;
+    const BAND: &str = "<\"blue\" & red>";
 
-enum Values<'a> {
-    F64(ByIndex<'a, f64>),
-    F32(ByIndex<'a, f32>),
-    I64(ByIndex<'a, i64>),
-    U32(ByIndex<'a, u32>),
-}
-
-impl<'a> Array<'a> {
-    fn new(name: impl Into<String>, count: usize, values: Values<'a>) -> Self {
-        let name = name.into();
-        Self {
-            name,
-            components: 1,
-            count,
-            values,
-        }
+    fn scene_and_solution() -> (Scene, Solution) {
+        let organ = |id: &str, plant: &str| Organ {
+            id: id.into(),
+            plant: plant.into(),
+        };
+        let scene = Scene {
+            triangles: vec![[DVec3::ZERO, DVec3::X, DVec3::Y], [DVec3::Z; 3]],
+            organ: vec![2, 0],
+            organs: vec![organ("a", "p"), organ("b", "p"), organ("c", "q")],
+            origin_m: DVec3::new(10.0, 20.0, 30.0),
+            ..Scene::default()
+        };
+        let light = ItemLight {
+            irradiance_upper_W_m2: 4.0,
+            irradiance_lower_W_m2: 2.0,
+            absorbed_W: 1.5,
+            ..ItemLight::default()
+        };
+        let solution = Solution {
+            triangles: vec![light; 2],
+            triangle_area_m2: vec![0.5, 0.0],
+            ..Solution::default()
+        };
+        (scene, solution)
     }
 
-    /// VTK's name of the type, and the size of a value in bytes.
-    fn kind(&self) -> (&'static str, usize) {
-        match self.values {
-            Values::F64(_) => ("Float64", 8),
-            Values::F32(_) => ("Float32", 4),
-            Values::I64(_) => ("Int64", 8),
-            Values::U32(_) => ("UInt32", 4),
-        }
+    fn attribute<'a>(tag: &'a str, name: &str) -> &'a str {
+        let from = tag.find(&format!(" {name}=\"")).expect("the attribute") + name.len() + 3;
+        &tag[from..from + tag[from..].find('"').expect("its end")]
     }
 
-    fn bytes(&self) -> usize {
-        self.count * self.kind().1
+    /// Name, type and bytes of every array, found the way a reader finds them.
+    fn arrays(file: &[u8]) -> Vec<(String, String, Vec<u8>)> {
+        let mark = b"<AppendedData encoding=\"raw\">\n_";
+        let head = file
+            .windows(mark.len())
+            .position(|window| window == mark)
+            .expect("the mark");
+        let xml = std::str::from_utf8(&file[..head]).expect("text");
+        let data = &file[head + mark.len()..];
+        let mut end = 0;
+        let arrays = xml
+            .lines()
+            .filter(|line| line.starts_with("<DataArray"))
+            .map(|tag| {
+                let offset: usize = attribute(tag, "offset").parse().expect("a number");
+                assert_eq!(offset, end, "no gap and no overlap");
+                let (length, rest) = data[offset..].split_first_chunk::<8>().expect("a length");
+                let length = u64::from_le_bytes(*length) as usize;
+                end = offset + 8 + length;
+                (
+                    attribute(tag, "Name").to_owned(),
+                    attribute(tag, "type").to_owned(),
+                    rest[..length].to_vec(),
+                )
+            })
+            .collect();
+        assert_eq!(&data[end..], b"\n</AppendedData>\n</VTKFile>\n");
+        arrays
     }
 
-    fn append(&self, out: &mut impl Write) -> Result<(), Fault> {
-        out.write_all(&(self.bytes() as u64).to_le_bytes())?;
-        let indices = 0..self.count;
-        match &self.values {
-            Values::F64(value) => indices.map(value).try_for_each(|v| {
-                self.finite(v)?;
-                Ok(out.write_all(&v.to_le_bytes())?)
-            }),
-            Values::F32(value) => indices.map(value).try_for_each(|v| {
-                self.finite(v.into())?;
-                Ok(out.write_all(&v.to_le_bytes())?)
-            }),
-            Values::I64(value) => whole(
-                indices
-                    .map(value)
-                    .try_for_each(|v| out.write_all(&v.to_le_bytes())),
+    #[test]
+    fn a_reader_finds_all_arrays() {
+        let (scene, solution) = scene_and_solution();
+        let mut file = Vec::new();
+        write(&scene, &[BAND], &solution, &mut file).expect("written");
+        let bytes_of = |values: &[f32]| {
+            values
+                .iter()
+                .flat_map(|v| v.to_le_bytes())
+                .collect::<Vec<_>>()
+        };
+        let points = [
+            10., 20., 30., 11., 20., 30., 10., 21., 30., 10., 20., 31., 10., 20., 31., 10., 20.,
+            31.,
+        ];
+        let band = "&lt;&quot;blue&quot; &amp; red&gt;";
+        let named = |quantity: &str| format!("{quantity} {band}");
+        let expected: Vec<(String, &str, Vec<u8>)> = vec![
+            (
+                "Points".into(),
+                "Float64",
+                points.iter().flat_map(|v: &f64| v.to_le_bytes()).collect(),
             ),
-            Values::U32(value) => whole(
-                indices
-                    .map(value)
-                    .try_for_each(|v| out.write_all(&v.to_le_bytes())),
+            (
+                "connectivity".into(),
+                "Int64",
+                (0..6_i64).flat_map(i64::to_le_bytes).collect(),
             ),
+            (
+                "offsets".into(),
+                "Int64",
+                [3_i64, 6].into_iter().flat_map(i64::to_le_bytes).collect(),
+            ),
+            (named("absorbed_W_m2"), "Float32", bytes_of(&[3.0, 0.0])),
+            (
+                named("irradiance_upper_W_m2"),
+                "Float32",
+                bytes_of(&[4.0, 0.0]),
+            ),
+            (
+                named("irradiance_lower_W_m2"),
+                "Float32",
+                bytes_of(&[2.0, 0.0]),
+            ),
+            (
+                "organ".into(),
+                "UInt32",
+                [2_u32, 0].into_iter().flat_map(u32::to_le_bytes).collect(),
+            ),
+            (
+                "plant".into(),
+                "UInt32",
+                [1_u32, 0].into_iter().flat_map(u32::to_le_bytes).collect(),
+            ),
+        ];
+        let found = arrays(&file);
+        assert_eq!(found.len(), expected.len());
+        for (found, expected) in found.iter().zip(&expected) {
+            assert_eq!(
+                (&found.0, found.1.as_str(), &found.2),
+                (&expected.0, expected.1, &expected.2)
+            );
         }
     }
 
-    fn finite(&self, value: f64) -> Result<(), Fault> {
-        if value.is_finite() {
-            return Ok(());
-        }
-        let place = format!("a value of {}", self.name);
-        Err(Fault::NotFinite { place, value })
+    #[test]
+    fn infinities_are_refused() {
+        let (scene, mut solution) = scene_and_solution();
+        solution.triangles[0].absorbed_W = 1e300;
+        let error =
+            write(&scene, &["PAR"], &solution, &mut Vec::new()).expect_err("too large for f32");
+        assert_eq!(
+            error.to_string(),
+            "a value of absorbed_W_m2 PAR is inf, not a finite number"
+        );
     }
-}
-
-fn whole(written: io::Result<()>) -> Result<(), Fault> {
-    Ok(written?)
-}
-
-/// The head of the file, and where the next array will begin after it.
-#[derive(Default)]
-struct Xml {
-    text: String,
-    offset: usize,
-}
-
-impl Xml {
-    fn line(&mut self, line: &str) {
-        self.text.push_str(line);
-        self.text.push('\n');
-    }
-
-    fn array(&mut self, array: &Array<'_>) {
-        self.line(&format!(
-            "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{}\"/>",
-            array.kind().0,
-            escaped(&array.name),
-            array.components,
-            self.offset,
-        ));
-        self.offset += size_of::<u64>() + array.bytes();
-    }
-}
-
-/// Text for an XML attribute. XML has no control characters, not even escaped.
-fn escaped(text: &str) -> String {
-    let mut out = String::with_capacity(text.len());
-    for character in text.chars() {
-        match character {
-            '&' => out.push_str("&amp;"),
-            '<' => out.push_str("&lt;"),
-            '>' => out.push_str("&gt;"),
-            '"' => out.push_str("&quot;"),
-            '\u{fffe}' | '\u{ffff}' => out.push(char::REPLACEMENT_CHARACTER),
-            c if c.is_control() => out.push(char::REPLACEMENT_CHARACTER),
-            c => out.push(c),
-        }
-    }
-    out
 }
