@@ -8,7 +8,18 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod assemble;
+pub mod directions;
+pub mod elements;
+pub mod ends;
+pub mod formats;
+pub mod generate;
+pub mod geometry;
+pub mod inputs;
+pub mod inspection;
+pub mod lattice;
 pub mod light;
 pub mod optics;
+pub mod options;
 pub mod problem;
 pub mod scene;

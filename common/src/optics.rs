@@ -114,6 +114,14 @@ pub enum OpticsFault {
     },
 }
 
+impl OpticsFault {
+    /// The values that were refused, for messages that say in their own words what is expected.
+    pub fn values(self) -> String {
+        let (Self::Negative { rho, tau } | Self::MoreThanOne { rho, tau }) = self;
+        format!("rho = {rho} and tau = {tau}")
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

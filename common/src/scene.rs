@@ -1,5 +1,7 @@
 //! The scene: triangles with their organ and material, the pattern, the soil.
 
+use std::fmt;
+
 use glam::{DVec2, DVec3};
 
 /// A canopy ready to be computed: checked, in metres, moved to a local origin.
@@ -27,7 +29,7 @@ pub struct Scene {
 }
 
 /// A group of triangles that is reported as one.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
 pub struct Organ {
     /// As in the output: for CAN, plant * 1000 + leaf; for OBJ, the group's name.
     pub id: String,
@@ -52,6 +54,17 @@ pub enum Material {
     Soil,
     /// A material known by name (OBJ).
     Named(String),
+}
+
+impl fmt::Display for Material {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stem { species } => write!(f, "stem of species {species}"),
+            Self::Leaf { species } => write!(f, "leaf of species {species}"),
+            Self::Soil => f.write_str("soil"),
+            Self::Named(name) => f.write_str(name),
+        }
+    }
 }
 
 /// The rectangle in x, y on which a periodic canopy repeats, relative to the local origin.

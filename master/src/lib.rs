@@ -6,5 +6,9 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod direct;
+pub mod exchange;
 pub mod output;
 pub mod solution;
+pub mod solver;
+pub mod world;

@@ -1,6 +1,12 @@
 //! Light that falls on the canopy: a list of parallel sources.
 
+pub mod sky;
+mod spec;
+pub mod sun;
+
 use glam::DVec3;
+
+pub use spec::{Sky, SkyLight};
 
 /// A parallel source: the sun, or one direction of a sky.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,110 @@
+//! Why no problem could be made of the inputs.
+
+use thiserror::Error;
+
+use crate::formats::{FormatError, MAX_COORDINATE, MAX_TRIANGLES, Place};
+use crate::inputs::LightFault;
+use crate::optics::OpticsFault;
+use crate::options::OptionFault;
+
+/// Why no problem could be made of the inputs.
+#[derive(Debug, Error)]
+pub enum LoadError {
+    /// A file is not what its format asks for.
+    #[error(transparent)]
+    Format(#[from] FormatError),
+    /// An option is out of its range.
+    #[error(transparent)]
+    Option(#[from] OptionFault),
+    /// The sky cannot be.
+    #[error(transparent)]
+    Light(#[from] LightFault),
+    /// Optical properties that did not come from a file are not physical.
+    #[error("{material} in band {band}: {fault}")]
+    Optics {
+        /// The material.
+        material: String,
+        /// The band.
+        band: String,
+        /// What is wrong.
+        fault: OpticsFault,
+    },
+    /// Nothing says what is to be computed.
+    #[error("expected {expected}, found none")]
+    Missing {
+        /// What there must be.
+        expected: &'static str,
+    },
+    /// The geometry files hold no triangle.
+    #[error("{files}: expected at least one triangle, found none")]
+    EmptyScene {
+        /// Their names.
+        files: String,
+    },
+    /// All geometry files together hold too much.
+    #[error("{files}: expected at most {MAX_TRIANGLES} triangles, found {found}")]
+    TooManyTriangles {
+        /// Their names.
+        files: String,
+        /// How many triangles they hold.
+        found: usize,
+    },
+    /// The scene uses a species that an `.opt` file does not have.
+    #[error("{used}: species {species} is not in {opt_file}, which has {known} (band {band})")]
+    UnknownSpecies {
+        /// Where the species is first used.
+        used: Place,
+        /// Its number.
+        species: u32,
+        /// The file that should have it.
+        opt_file: String,
+        /// How many species that file has.
+        known: usize,
+        /// The band of the file.
+        band: String,
+    },
+    /// The scene uses a material that a band says nothing of.
+    #[error("{used}: material '{material}' has no optical properties in band {band}")]
+    UnknownMaterial {
+        /// Where the material is first used.
+        used: Place,
+        /// Its name.
+        material: String,
+        /// The band without it.
+        band: String,
+    },
+    /// There is soil, and a band without an albedo for it.
+    #[error("band {band} has no soil albedo, but the scene has soil")]
+    NoSoilAlbedo {
+        /// The band.
+        band: String,
+    },
+    /// Results could not be told apart.
+    #[error("band names must differ and not be empty, found '{name}' twice or empty")]
+    BandName {
+        /// The name.
+        name: String,
+    },
+    /// Light per band must name exactly the bands there are.
+    #[error("light is given for bands {given}, expected {expected}")]
+    LightBands {
+        /// As given.
+        given: String,
+        /// The bands of the scene.
+        expected: String,
+    },
+    /// The height of the soil is no height.
+    #[error(
+        "soil height: expected a finite number within {MAX_COORDINATE:e} of zero, found {found}"
+    )]
+    SoilHeight {
+        /// As given.
+        found: f64,
+    },
+    /// The corners that were given span no area, or lie too far out.
+    #[error("pattern: expected corners that differ in x and in y, found {found}")]
+    Pattern {
+        /// As given.
+        found: String,
+    },
+}

@@ -1,0 +1,208 @@
+//! What a scene file says, checked as far as it can be without opening other files.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::path::Path;
+
+use toml::Spanned;
+
+use super::super::error::FormatError;
+use super::super::pattern::{Rectangle, refused};
+use super::Text;
+use super::tables::{
+    BandTable, FaceTable, LightTable, LightText, MaterialTable, OneOrMany, PatternText, SceneFile,
+    SkyKind, SkyTable, TimeText,
+};
+use crate::inputs::{BandInput, Inputs, LightInput, PatternInput};
+use crate::light::Sky;
+use crate::optics::{FaceOptics, LeafOptics};
+
+/// Paths become relative to what `folder` is relative to.
+pub(super) fn inputs(
+    file: SceneFile,
+    text: &Text<'_>,
+    folder: &Path,
+) -> Result<Inputs, FormatError> {
+    let scenes = match file.scene {
+        None => Vec::new(),
+        Some(OneOrMany::One(path)) => vec![folder.join(path)],
+        Some(OneOrMany::Many(paths)) => paths.iter().map(|path| folder.join(path)).collect(),
+    };
+    if let Some(soil) = &file.soil
+        && !soil.as_ref().is_finite()
+    {
+        return Err(text.fault(&soil.span(), "a finite soil height", soil.as_ref()));
+    }
+    if let Some(options) = &file.options {
+        let checked = options.as_ref().check();
+        checked.map_err(|fault| text.message(&options.span(), fault))?;
+    }
+    let pattern = file.pattern.map(|given| pattern(given, text, folder));
+    let bands = file.bands.into_iter();
+    let bands = bands.map(|given| band(given, text, folder));
+    let light = file.light.map(|given| light(given, text, folder));
+    Ok(Inputs {
+        scenes,
+        unit: file.unit,
+        pattern: pattern.transpose()?,
+        soil: file.soil.map(Spanned::into_inner),
+        bands: bands.collect::<Result<_, _>>()?,
+        light: light.transpose()?,
+        options: file.options.map(Spanned::into_inner).unwrap_or_default(),
+    })
+}
+
+fn pattern(
+    given: Spanned<PatternText>,
+    text: &Text<'_>,
+    folder: &Path,
+) -> Result<PatternInput, FormatError> {
+    let span = given.span();
+    match given.into_inner() {
+        PatternText::File(path) => Ok(PatternInput::File(folder.join(path))),
+        PatternText::Corners(corners) if Rectangle::from_corners(corners).is_some() => {
+            Ok(PatternInput::Corners(corners))
+        }
+        PatternText::Corners(corners) => Err(refused(text.place(&span), corners)),
+    }
+}
+
+fn band(
+    given: Spanned<BandTable>,
+    text: &Text<'_>,
+    folder: &Path,
+) -> Result<BandInput, FormatError> {
+    let place = text.place(&given.span());
+    let band = given.into_inner();
+    if let Some(albedo) = &band.soil_albedo {
+        if band.optics.is_some() {
+            return Err(text.fault(
+                &albedo.span(),
+                "the albedo of the soil in the optics file or here",
+                "both",
+            ));
+        }
+        if !(0.0..=1.0).contains(albedo.as_ref()) {
+            return Err(text.fault(&albedo.span(), "an albedo from 0 to 1", albedo.as_ref()));
+        }
+    }
+    let mut materials = BTreeMap::new();
+    for (name, given) in band.materials {
+        materials.insert(name, material(&given, text)?);
+    }
+    Ok(BandInput {
+        name: band.name,
+        optics: band.optics.map(|path| folder.join(path)),
+        soil_albedo: band.soil_albedo.map(Spanned::into_inner),
+        materials,
+        place: Some(place),
+    })
+}
+
+fn material(given: &Spanned<MaterialTable>, text: &Text<'_>) -> Result<LeafOptics, FormatError> {
+    let face = |face: FaceTable| FaceOptics {
+        rho: face.rho,
+        tau: face.tau,
+    };
+    let optics = match *given.as_ref() {
+        MaterialTable {
+            rho: Some(rho),
+            tau,
+            upper: None,
+            lower: None,
+        } => LeafOptics::symmetric(rho, tau.unwrap_or(0.0)),
+        MaterialTable {
+            rho: None,
+            tau: None,
+            upper: Some(upper),
+            lower: Some(lower),
+        } => LeafOptics {
+            upper: face(upper),
+            lower: face(lower),
+        },
+        _ => {
+            return Err(text.fault(
+                &given.span(),
+                "rho (and tau) of both faces, or upper and lower with rho (and tau) each",
+                "another choice of them",
+            ));
+        }
+    };
+    let checked = optics.check();
+    checked.map_err(|fault| text.message(&given.span(), fault))?;
+    Ok(optics)
+}
+
+fn light(
+    given: Spanned<LightText>,
+    text: &Text<'_>,
+    folder: &Path,
+) -> Result<LightInput, FormatError> {
+    let span = given.span();
+    let light = match given.into_inner() {
+        LightText::File(path) => LightInput::File(folder.join(path)),
+        LightText::Table(LightTable {
+            files: Some(files),
+            sky: None,
+        }) => {
+            let files = files.into_iter();
+            LightInput::Files(
+                files
+                    .map(|(band, path)| (band, folder.join(path)))
+                    .collect(),
+            )
+        }
+        LightText::Table(LightTable {
+            files: None,
+            sky: Some(given),
+        }) => sky(given, &span, text)?,
+        LightText::Table(_) => {
+            let expected = "either [light.files] or [light.sky]";
+            return Err(text.fault(&span, expected, "both or none"));
+        }
+    };
+    light.check().map_err(|fault| text.message(&span, fault))?;
+    Ok(light)
+}
+
+fn sky(given: SkyTable, span: &Range<usize>, text: &Text<'_>) -> Result<LightInput, FormatError> {
+    let when_and_where = (
+        given.time_utc,
+        given.latitude_deg,
+        given.longitude_deg,
+        given.diffuse_fraction,
+    );
+    let sky = match (given.kind, when_and_where) {
+        (SkyKind::UniformOvercast, (None, None, None, None)) => Sky::UniformOvercast,
+        (SkyKind::StandardOvercast, (None, None, None, None)) => Sky::StandardOvercast,
+        (SkyKind::Clear, (Some(time), Some(latitude), Some(longitude), Some(diffuse))) => {
+            Sky::Clear {
+                time_utc: match time {
+                    TimeText::Date(date) => date.to_string(),
+                    TimeText::Text(text) => text,
+                },
+                latitude_deg: latitude,
+                longitude_deg: longitude,
+                diffuse_fraction: diffuse,
+            }
+        }
+        (SkyKind::Clear, _) => {
+            return Err(text.fault(
+                span,
+                "time_utc, latitude_deg, longitude_deg and diffuse_fraction for a clear sky",
+                "not all of them",
+            ));
+        }
+        _ => {
+            return Err(text.fault(
+                span,
+                "nothing but irradiance_W_m2 for an overcast sky",
+                "more",
+            ));
+        }
+    };
+    Ok(LightInput::Sky {
+        sky,
+        irradiance_W_m2: given.irradiance_W_m2,
+    })
+}

@@ -1,0 +1,103 @@
+//! `scene.toml`: all that a solve needs, in one file.
+//!
+//! ```toml
+//! scene = "maize.can.gz"              # or a list of files
+//! unit = "m"                          # of geometry, pattern and soil
+//! pattern = "maize.8"                 # or [x0, y0, x1, y1]
+//! soil = -0.002
+//! light = "clear.light"
+//!
+//! [[bands]]
+//! name = "PAR"
+//! optics = "par.opt"
+//!
+//! [[bands]]
+//! name = "NIR"
+//! soil_albedo = 0.25
+//! [bands.materials]
+//! bark = { rho = 0.4 }
+//! leaf = { upper = { rho = 0.44, tau = 0.45 }, lower = { rho = 0.46, tau = 0.44 } }
+//!
+//! [options]
+//! accuracy_percent = 0.5
+//! ```
+//!
+//! In place of `light = "FILE"`: `[light.files]`, with one `.light` file for each band's name, or
+//! `[light.sky]` with `kind = "uniform_overcast"`, `"standard_overcast"` or `"clear"`,
+//! `irradiance_W_m2 = { PAR = 400.0, NIR = 380.0 }`, and for a clear sky `time_utc`, `latitude_deg`,
+//! `longitude_deg`, `diffuse_fraction`. Paths are relative to the scene file.
+
+mod checks;
+mod tables;
+
+use std::fmt::Display;
+use std::ops::Range;
+use std::path::Path;
+
+use tables::SceneFile;
+
+use super::error::{FormatError, Place};
+use crate::inputs::Inputs;
+
+/// Parses a scene file; `file` is its name in messages, `folder` what its paths are relative to.
+pub fn parse(file: &str, bytes: &[u8], folder: &Path) -> Result<Inputs, FormatError> {
+    let text = Text::new(file, bytes)?;
+    let raw: SceneFile = toml::from_str(text.text).map_err(|error| FormatError::Scene {
+        place: error
+            .span()
+            .map_or_else(|| Place::file(file), |span| text.place(&span)),
+        message: error.message().replace('\n', ", "),
+    })?;
+    checks::inputs(raw, &text, folder)
+}
+
+/// The text, to turn positions into line numbers.
+struct Text<'a> {
+    file: &'a str,
+    text: &'a str,
+}
+
+impl<'a> Text<'a> {
+    fn new(file: &'a str, bytes: &'a [u8]) -> Result<Self, FormatError> {
+        match std::str::from_utf8(bytes) {
+            Ok(text) => Ok(Self { file, text }),
+            Err(error) => {
+                let line = line_of(bytes, error.valid_up_to());
+                Err(FormatError::Content {
+                    place: Place::line(file, line),
+                    expected: "UTF-8 text".to_owned(),
+                    found: "other bytes".to_owned(),
+                })
+            }
+        }
+    }
+
+    fn place(&self, span: &Range<usize>) -> Place {
+        Place::line(self.file, line_of(self.text.as_bytes(), span.start))
+    }
+
+    fn message(&self, span: &Range<usize>, message: impl Display) -> FormatError {
+        FormatError::Scene {
+            place: self.place(span),
+            message: message.to_string(),
+        }
+    }
+
+    fn fault(
+        &self,
+        span: &Range<usize>,
+        expected: impl Display,
+        found: impl Display,
+    ) -> FormatError {
+        FormatError::Content {
+            place: self.place(span),
+            expected: expected.to_string(),
+            found: found.to_string(),
+        }
+    }
+}
+
+fn line_of(bytes: &[u8], position: usize) -> usize {
+    let before = &bytes[..position.min(bytes.len())];
+    1 + before.iter().filter(|&&byte| byte == b'\n').count()
+}

@@ -1,0 +1,161 @@
+//! What to load: the same for the command line and for a scene file.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use thiserror::Error;
+
+use crate::formats::Place;
+use crate::light::Sky;
+use crate::optics::LeafOptics;
+use crate::options::{Options, Unit};
+
+/// The files and values that make a problem. Anything may be missing here; [`crate::assemble::load`]
+/// says what must be there.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Inputs {
+    /// Geometry: `.obj` and `.obj.gz` are Wavefront OBJ, all else is CAN.
+    pub scenes: Vec<PathBuf>,
+    /// Of geometry, pattern and soil height; metres where it is not given.
+    pub unit: Option<Unit>,
+    /// Where the canopy repeats; `None` for an isolated scene.
+    pub pattern: Option<PatternInput>,
+    /// Height of the soil plane in `unit`; `None` for a black void below.
+    pub soil: Option<f64>,
+    /// In the order of the results.
+    pub bands: Vec<BandInput>,
+    /// The light above the canopy.
+    pub light: Option<LightInput>,
+    /// How to solve.
+    pub options: Options,
+}
+
+impl Inputs {
+    /// These inputs where they say something, the others elsewhere: flags over a scene file.
+    /// Lists (scenes, bands) are taken as a whole from one or the other.
+    #[must_use]
+    pub fn over(self, other: Self) -> Self {
+        let first = |mine: Vec<PathBuf>, theirs| if mine.is_empty() { theirs } else { mine };
+        Self {
+            scenes: first(self.scenes, other.scenes),
+            unit: self.unit.or(other.unit),
+            pattern: self.pattern.or(other.pattern),
+            soil: self.soil.or(other.soil),
+            bands: if self.bands.is_empty() {
+                other.bands
+            } else {
+                self.bands
+            },
+            light: self.light.or(other.light),
+            options: self.options.over(other.options),
+        }
+    }
+}
+
+/// The pattern, from a file or as two corners.
+#[derive(Clone, Debug, PartialEq)]
+pub enum PatternInput {
+    /// A `.8` file.
+    File(PathBuf),
+    /// x y and x y of two opposite corners.
+    Corners([f64; 4]),
+}
+
+/// A wavelength band and where its optical properties are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BandInput {
+    /// The user's name for it.
+    pub name: String,
+    /// An `.opt` file: soil and CAN species.
+    pub optics: Option<PathBuf>,
+    /// Albedo of the soil, 0 to 1, where it is not the file's.
+    pub soil_albedo: Option<f64>,
+    /// Materials by name (OBJ).
+    pub materials: BTreeMap<String, LeafOptics>,
+    /// Where the band is written down, if in a scene file.
+    pub place: Option<Place>,
+}
+
+/// The light, from files or as a sky.
+#[derive(Clone, Debug, PartialEq)]
+pub enum LightInput {
+    /// One `.light` file, the same irradiance in all bands.
+    File(PathBuf),
+    /// A `.light` file per band, by the band's name.
+    Files(BTreeMap<String, PathBuf>),
+    /// A sky, with the irradiance of the horizontal (W m⁻²) by the band's name.
+    Sky {
+        /// How its light is distributed.
+        sky: Sky,
+        /// One for every band.
+        irradiance_W_m2: BTreeMap<String, f64>,
+    },
+}
+
+impl LightInput {
+    /// Refuses a sky that cannot be. Files are checked as they are read.
+    pub fn check(&self) -> Result<(), LightFault> {
+        let Self::Sky {
+            sky,
+            irradiance_W_m2,
+        } = self
+        else {
+            return Ok(());
+        };
+        for (band, &found) in irradiance_W_m2 {
+            if !(found.is_finite() && found >= 0.0) {
+                let band = band.clone();
+                return Err(LightFault::Irradiance { band, found });
+            }
+        }
+        let Sky::Clear {
+            latitude_deg,
+            longitude_deg,
+            diffuse_fraction,
+            ..
+        } = sky
+        else {
+            return Ok(());
+        };
+        for (value, found, low, high) in [
+            ("latitude_deg", *latitude_deg, -90.0, 90.0),
+            ("longitude_deg", *longitude_deg, -180.0, 180.0),
+            ("diffuse_fraction", *diffuse_fraction, 0.0, 1.0),
+        ] {
+            if !(low..=high).contains(&found) {
+                return Err(LightFault::Range {
+                    value,
+                    low,
+                    high,
+                    found,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Why a sky was refused.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum LightFault {
+    /// Less than no light, or no number.
+    #[error("irradiance in band {band}: expected a finite number of at least 0, found {found}")]
+    Irradiance {
+        /// The band's name.
+        band: String,
+        /// As given, W m⁻².
+        found: f64,
+    },
+    /// A value that is nowhere on earth, or no fraction.
+    #[error("{value}: expected {low} to {high}, found {found}")]
+    Range {
+        /// Its name.
+        value: &'static str,
+        /// The least it may be.
+        low: f64,
+        /// The most it may be.
+        high: f64,
+        /// As given.
+        found: f64,
+    },
+}

@@ -1,0 +1,231 @@
+//! The projection lattice: parallel lines through the scene, and which triangles each one meets.
+//!
+//! A canopy is sheared along a direction onto the horizontal plane and scanned on a rectangular
+//! lattice of points; each lattice point is a line. With a pattern the lattice is a torus, so a
+//! periodic canopy costs nothing extra and is exact at any inclination. The lattice is fixed to the
+//! world: whichever part of a scene is drawn, the same line meets the same triangles.
+
+mod scan;
+mod strips;
+
+use glam::{DVec2, DVec3};
+
+pub use scan::{Fragment, Projected};
+pub use strips::Strips;
+
+/// Where lines may run: what fixes a lattice to the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    /// Lower corner of everything that lines are to meet, metres. With a pattern, x and y are the
+    /// pattern's lower corner.
+    pub min_m: DVec3,
+    /// Upper corner, metres. With a pattern, x and y are the pattern's upper corner.
+    pub max_m: DVec3,
+    /// The x, y rectangle repeats for ever.
+    pub periodic: bool,
+}
+
+/// Parallel lines along one direction, on a lattice of `nx * ny` points.
+///
+/// Coordinates `(u, v)` are in lattice steps, so that lines pass through whole numbers; `s` is the
+/// distance along the direction in metres.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lattice {
+    /// Unit vector along the lines, `z > 0`.
+    pub direction: DVec3,
+    /// Lattice points along x and y.
+    pub nx: u32,
+    /// See `nx`.
+    pub ny: u32,
+    /// The lattice closes on itself.
+    pub periodic: bool,
+    /// Area of the cross-section of a line, perpendicular to it, m².
+    pub line_area_m2: f64,
+    steps_per_m: DVec2,
+    shear: DVec2,
+    offset: DVec2,
+    s_min_m: f64,
+    s_steps_per_m: f64,
+}
+
+/// Vertices are rounded to this part of a lattice step, so that copies of a vertex one pattern
+/// apart stay exactly one pattern apart.
+const SUBSTEPS: f64 = (1u64 << 20) as f64;
+
+/// Largest number of steps along one side; keeps every coordinate exact in f64.
+const MAX_SIDE: f64 = (1u64 << 24) as f64;
+
+impl Lattice {
+    /// A lattice of lines whose cross-section is close to `line_area_m2` (m², > 0).
+    ///
+    /// `random` are three numbers in [0, 1): the offset of the lattice in x and y (in steps), and
+    /// the rounding of the number of lines: it is rounded up or down at random so that the expected
+    /// number of lines is exactly the area divided by `line_area_m2`. A lattice may be empty.
+    pub fn new(direction: DVec3, extent: &Extent, line_area_m2: f64, random: [f64; 3]) -> Self {
+        let d = direction;
+        let shear = DVec2::new(d.x / d.z, d.y / d.z);
+        // sheared to the level z = min z
+        let height = extent.max_m.z - extent.min_m.z;
+        let (mut lo, mut hi) = (extent.min_m.truncate(), extent.max_m.truncate());
+        if !extent.periodic {
+            let slide = -shear * height;
+            lo += slide.min(DVec2::ZERO);
+            hi += slide.max(DVec2::ZERO);
+        }
+        let size = (hi - lo).max(DVec2::splat(f64::MIN_POSITIVE));
+        // Cross-sections stay close to squares: what a slanted direction stretches is the step
+        // along its azimuth.
+        let side = line_area_m2.sqrt();
+        let horizontal = d.x * d.x + d.y * d.y;
+        let along_x = if horizontal > 0.0 {
+            d.x * d.x / horizontal
+        } else {
+            0.5
+        };
+        let wanted_y = (size.y / (side * d.z.powf(along_x - 1.0))).clamp(1.0, MAX_SIDE);
+        let ny = wanted_y.round();
+        let lines = size.x * size.y * d.z / line_area_m2;
+        let nx = (lines / ny + random[2]).floor().min(MAX_SIDE);
+        let steps_per_m = DVec2::new(nx.max(1.0), ny) / size;
+        // s = (z - z_min) / d.z runs over at most this range
+        let s_range = (height / d.z).max(f64::MIN_POSITIVE);
+        Self {
+            direction: d,
+            nx: nx as u32,
+            ny: ny as u32,
+            periodic: extent.periodic,
+            line_area_m2: size.x * size.y * d.z / (nx.max(1.0) * ny),
+            steps_per_m,
+            shear,
+            offset: DVec2::new(random[0], random[1]) - (lo - shear * extent.min_m.z) * steps_per_m,
+            s_min_m: extent.min_m.z / d.z,
+            s_steps_per_m: S_STEPS / s_range,
+        }
+    }
+
+    /// Number of lines.
+    pub fn lines(&self) -> usize {
+        self.nx as usize * self.ny as usize
+    }
+
+    /// Lattice coordinates of a point, before rounding.
+    pub fn place(&self, p: DVec3) -> DVec2 {
+        DVec2::new(
+            (p.x - p.z * self.shear.x) * self.steps_per_m.x + self.offset.x,
+            (p.y - p.z * self.shear.y) * self.steps_per_m.y + self.offset.y,
+        )
+    }
+
+    /// The point at height `z_m` on the line through lattice point `(i, j)`.
+    pub fn point_at(&self, i: f64, j: f64, z_m: f64) -> DVec3 {
+        DVec3::new(
+            (i - self.offset.x) / self.steps_per_m.x + z_m * self.shear.x,
+            (j - self.offset.y) / self.steps_per_m.y + z_m * self.shear.y,
+            z_m,
+        )
+    }
+
+    fn snapped(&self, p: DVec3) -> [f64; 3] {
+        let uv = self.place(p) * SUBSTEPS;
+        [
+            uv.x.round_ties_even() / SUBSTEPS,
+            uv.y.round_ties_even() / SUBSTEPS,
+            p.z / self.direction.z,
+        ]
+    }
+
+    /// Distance along the line as a whole number that sorts like it; see [`Self::distance_m`].
+    fn depth(&self, s_m: f64) -> u32 {
+        // a float-to-integer cast saturates: what lies outside the extent sorts to its ends
+        ((s_m - self.s_min_m) * self.s_steps_per_m) as u32
+    }
+
+    /// Metres along the line between two depths of fragments.
+    pub fn distance_m(&self, depth_difference: u32) -> f64 {
+        f64::from(depth_difference) / self.s_steps_per_m
+    }
+
+    /// Height of a depth, metres.
+    pub fn height_m(&self, depth: u32) -> f64 {
+        (f64::from(depth) / self.s_steps_per_m + self.s_min_m) * self.direction.z
+    }
+
+    /// Depth of a height, all along a horizontal plane.
+    pub fn depth_of_height(&self, z_m: f64) -> u32 {
+        self.depth(z_m / self.direction.z)
+    }
+}
+
+/// Number of depth steps from the bottom to the top of the extent: the range of a line is resolved
+/// to one part in four thousand million.
+const S_STEPS: f64 = DEPTH_OF_TOP as f64;
+
+/// Depth of the top of the extent; that of its bottom is 0.
+pub const DEPTH_OF_TOP: u32 = u32::MAX - 1;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn extent(periodic: bool) -> Extent {
+        Extent {
+            min_m: DVec3::new(-0.4, -0.75, 0.0),
+            max_m: DVec3::new(0.4, 0.75, 2.5),
+            periodic,
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn points_go_to_the_lattice_and_back(z in 0.01f64..1.0, phi in 0.0f64..6.3, h in 0.0f64..2.5, a in 0.0f64..1.0) {
+            let r = (1.0 - z * z).sqrt();
+            let d = DVec3::new(r * phi.cos(), r * phi.sin(), z);
+            for periodic in [true, false] {
+                let l = Lattice::new(d, &extent(periodic), 1e-5, [a, 0.3, 0.5]);
+                let p = DVec3::new(0.1, -0.2, h);
+                let uv = l.place(p);
+                let back = l.point_at(uv.x, uv.y, h);
+                prop_assert!((back - p).length() < 1e-9);
+                // a step along the direction stays on the line
+                prop_assert!((l.place(p + 0.1 * d) - uv).length() < 1e-6 * uv.length().max(1.0));
+            }
+        }
+
+        #[test]
+        fn an_open_lattice_covers_its_box(z in 0.001f64..1.0, phi in 0.0f64..6.3, corner in 0usize..8) {
+            let r = (1.0 - z * z).sqrt();
+            let d = DVec3::new(r * phi.cos(), r * phi.sin(), z);
+            let e = extent(false);
+            let l = Lattice::new(d, &e, 1e-4, [0.0, 0.0, 0.5]);
+            let pick = |b: usize, lo: f64, hi: f64| if corner >> b & 1 == 0 { lo } else { hi };
+            let uv = l.place(DVec3::new(
+                pick(0, e.min_m.x, e.max_m.x),
+                pick(1, e.min_m.y, e.max_m.y),
+                pick(2, e.min_m.z, e.max_m.z),
+            ));
+            let slack = 1e-6;
+            prop_assert!(uv.x >= -slack && uv.x <= f64::from(l.nx) + slack, "{uv} of {}", l.nx);
+            prop_assert!(uv.y >= -slack && uv.y <= f64::from(l.ny) + slack, "{uv} of {}", l.ny);
+        }
+    }
+
+    #[test]
+    fn the_expected_number_of_lines_is_exact() {
+        let d = DVec3::new(0.6, 0.0, 0.8);
+        let n = 2000;
+        let mean = (0..n)
+            .map(|k| {
+                Lattice::new(
+                    d,
+                    &extent(true),
+                    0.013,
+                    [0.0, 0.0, (f64::from(k) + 0.5) / f64::from(n)],
+                )
+                .lines()
+            })
+            .sum::<usize>() as f64
+            / f64::from(n);
+        assert!((mean - 1.2 * 0.8 / 0.013).abs() < 0.05, "{mean}");
+    }
+}

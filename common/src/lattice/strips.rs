@@ -1,0 +1,146 @@
+//! The lattice in strips of whole rows, so that what is drawn of a strip stays in the cache.
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+use super::{Lattice, Projected};
+
+/// Which triangles to draw in which strip.
+pub struct Strips {
+    rows_in_strip: u32,
+    rows: u32,
+    /// Start of each strip's list in `triangles`; empty when there is only one strip.
+    start: Vec<usize>,
+    triangles: Vec<u32>,
+    all: u32,
+}
+
+impl Strips {
+    /// Sorts triangles into strips of about `lines_in_strip` lines (at least one row of them).
+    pub fn new(lattice: &Lattice, triangles: &[[DVec3; 3]], lines_in_strip: usize) -> Self {
+        let rows_in_strip = (lines_in_strip / lattice.nx.max(1) as usize)
+            .clamp(1, lattice.ny.max(1) as usize) as u32;
+        let mut strips = Self {
+            rows_in_strip,
+            rows: lattice.ny,
+            start: Vec::new(),
+            triangles: Vec::new(),
+            all: triangles.len() as u32,
+        };
+        if strips.len() > 1 {
+            strips.sort(lattice, triangles);
+        }
+        strips
+    }
+
+    /// Number of strips.
+    pub fn len(&self) -> u32 {
+        self.rows.div_ceil(self.rows_in_strip)
+    }
+
+    /// A lattice without rows.
+    pub fn is_empty(&self) -> bool {
+        self.rows == 0
+    }
+
+    /// The lattice rows of a strip.
+    pub fn rows(&self, strip: u32) -> Range<u32> {
+        strip * self.rows_in_strip..((strip + 1) * self.rows_in_strip).min(self.rows)
+    }
+
+    /// The triangles that reach into a strip, each once, by rising number.
+    pub fn triangles(&self, strip: u32) -> impl Iterator<Item = u32> {
+        let (some, all) = if self.start.is_empty() {
+            (&[][..], 0..self.all)
+        } else {
+            (
+                &self.triangles[self.start[strip as usize]..self.start[strip as usize + 1]],
+                0..0,
+            )
+        };
+        some.iter().copied().chain(all)
+    }
+
+    fn sort(&mut self, lattice: &Lattice, triangles: &[[DVec3; 3]]) {
+        let mut members: Vec<(u32, u32)> = Vec::with_capacity(triangles.len() * 2);
+        for (t, triangle) in triangles.iter().enumerate() {
+            if let Some(projected) = Projected::new(lattice, triangle) {
+                for rows in self.wrapped(lattice, &projected).into_iter().flatten() {
+                    let strips =
+                        rows.start / self.rows_in_strip..=(rows.end - 1) / self.rows_in_strip;
+                    members.extend(strips.map(|s| (s, t as u32)));
+                }
+            }
+        }
+        let mut next = vec![0usize; self.len() as usize + 1];
+        for &(s, _) in &members {
+            next[s as usize + 1] += 1;
+        }
+        for s in 1..next.len() {
+            next[s] += next[s - 1];
+        }
+        self.start = next.clone();
+        self.triangles.resize(members.len(), 0);
+        for (s, t) in members {
+            self.triangles[next[s as usize]] = t;
+            next[s as usize] += 1;
+        }
+    }
+
+    /// Lattice rows that a triangle reaches: up to two ranges that share no strip.
+    fn wrapped(&self, lattice: &Lattice, projected: &Projected) -> [Option<Range<u32>>; 2] {
+        let (rows, ny) = (projected.rows(), i64::from(lattice.ny));
+        let range = |from: i64, to: i64| (from < to).then_some(from as u32..to as u32);
+        if !lattice.periodic {
+            return [range(rows.start.max(0), rows.end.min(ny)), None];
+        }
+        if rows.end - rows.start >= ny {
+            return [range(0, ny), None];
+        }
+        let from = rows.start.rem_euclid(ny);
+        let to = from + rows.end - rows.start;
+        // the part past the seam may come back into the strip where it began: once is enough
+        let strip_begin = from - from % i64::from(self.rows_in_strip);
+        [
+            range(from, to.min(ny)),
+            range(0, (to - ny).min(strip_begin)),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Extent, Lattice, Projected};
+    use super::*;
+    use proptest::prelude::*;
+
+    fn hits(lattice: &Lattice, triangles: &[[DVec3; 3]], lines_in_strip: usize) -> Vec<u32> {
+        let strips = Strips::new(lattice, triangles, lines_in_strip);
+        let mut hits = vec![0; lattice.lines()];
+        for s in 0..strips.len() {
+            for t in strips.triangles(s) {
+                if let Some(p) = Projected::new(lattice, &triangles[t as usize]) {
+                    p.scan(lattice, strips.rows(s), false, |f| hits[f.line] += 1);
+                }
+            }
+        }
+        hits
+    }
+
+    proptest! {
+        #[test]
+        fn strips_draw_what_the_whole_lattice_draws(
+            corners in proptest::collection::vec((-2.0f64..2.0, -2.0f64..2.0, 0.0f64..1.0), 9),
+            z in 0.05f64..1.0, periodic: bool, strip in 1usize..400,
+        ) {
+            let extent = Extent { min_m: DVec3::ZERO, max_m: DVec3::ONE, periodic };
+            let d = DVec3::new((1.0 - z * z).sqrt(), 0.0, z);
+            let lattice = Lattice::new(d, &extent, 3e-3, [0.3, 0.6, 0.5]);
+            let p: Vec<DVec3> = corners.iter().map(|&(x, y, z)| DVec3::new(x, y, z)).collect();
+            let triangles: Vec<[DVec3; 3]> = p.chunks_exact(3).map(|c| [c[0], c[1], c[2]]).collect();
+            let whole = hits(&lattice, &triangles, usize::MAX);
+            prop_assert_eq!(hits(&lattice, &triangles, strip), whole);
+        }
+    }
+}

@@ -1,0 +1,176 @@
+//! Built-in skies as a list of parallel sources.
+//!
+//! The sky is cut into horizontal bands of equal solid angle, one per direction, and every band gets
+//! one direction inside it; a golden-angle step in azimuth from band to band makes the directions a
+//! spiral, well spread with uniform density in solid angle. A direction carries the irradiance of
+//! its band under a uniform sky, which is known exactly, times the sky's radiance where the
+//! direction points to.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::num::NonZeroUsize;
+
+use glam::DVec3;
+use rand::{RngExt, SeedableRng};
+use rand_pcg::Pcg64;
+use thiserror::Error;
+
+use super::sun::{Sun, SunError};
+use super::{Sky, SkyLight, Source};
+
+/// Turn from one direction of the spiral to the next, radians: a full turn over the square of the
+/// golden ratio.
+const GOLDEN_ANGLE: f64 = TAU * 0.381_966_011_250_105_1;
+
+/// The lowest direction keeps at least this part of a band's height from the horizon. Lines near
+/// the horizon cost as 1 / cos(zenith angle); what is shifted is a sixteenth of the lowest band,
+/// and that band holds 1 / directions² of a uniform sky.
+const LOWEST_IN_BAND: f64 = 0.25;
+
+impl SkyLight {
+    /// The sky as `directions` sources, followed by the sun if there is one.
+    ///
+    /// In every band the irradiances add up to what was asked for, to rounding. The same `seed` gives
+    /// the same list; different seeds give independent realisations (turned in azimuth, and each
+    /// direction elsewhere in its band), so that their scatter shows what the number of directions
+    /// does to a result. A clear sky without a direct part has no sun in the list, one without a
+    /// diffuse part has only the sun.
+    pub fn sources(&self, directions: NonZeroUsize, seed: u64) -> Result<Vec<Source>, SkyError> {
+        if let Some(&value) = self
+            .irradiance_W_m2
+            .iter()
+            .find(|e| !(e.is_finite() && **e >= 0.0))
+        {
+            return Err(SkyError::Irradiance { value });
+        }
+        let scaled = |part: f64| self.irradiance_W_m2.iter().map(|e| part * e).collect();
+        let (radiance, diffuse, sun) = self.sky.resolve()?;
+        let mut sources = Vec::new();
+        if diffuse > 0.0 {
+            let parts = parts_of_sky(radiance, directions, seed);
+            let whole: f64 = parts.iter().map(|p| p.irradiance).sum();
+            sources.extend(parts.iter().map(|p| Source {
+                direction: -p.towards,
+                irradiance_W_m2: scaled(diffuse * p.irradiance / whole),
+            }));
+        }
+        if let Some(sun) = sun {
+            sources.push(Source {
+                direction: -sun.towards(),
+                irradiance_W_m2: scaled(1.0 - diffuse),
+            });
+        }
+        Ok(sources)
+    }
+}
+
+impl Sky {
+    /// How the sky's radiance is distributed, the diffuse part of all irradiance, and the sun if it
+    /// brings any.
+    fn resolve(&self) -> Result<(Radiance, f64, Option<Sun>), SkyError> {
+        match self {
+            Self::UniformOvercast => Ok((Radiance::Uniform, 1.0, None)),
+            Self::StandardOvercast => Ok((Radiance::MoonSpencer, 1.0, None)),
+            Self::Clear {
+                time_utc,
+                latitude_deg,
+                longitude_deg,
+                diffuse_fraction,
+            } => {
+                let diffuse = *diffuse_fraction;
+                if !(0.0..=1.0).contains(&diffuse) {
+                    return Err(SkyError::DiffuseFraction { value: diffuse });
+                }
+                let sun = Sun::at(time_utc, *latitude_deg, *longitude_deg)?;
+                let towards_sun = sun.towards();
+                let visible = (diffuse < 1.0).then_some(sun);
+                Ok((Radiance::CieClear { towards_sun }, diffuse, visible))
+            }
+        }
+    }
+}
+
+/// Radiance over the sky, in units of that of the zenith.
+#[derive(Clone, Copy, Debug)]
+enum Radiance {
+    Uniform,
+    /// Moon & Spencer 1942; also type 16 of the CIE standard (ISO 15469:2004).
+    MoonSpencer,
+    /// Type 12 of the CIE standard general sky (CIE S 011/E:2003, ISO 15469:2004): "CIE standard
+    /// clear sky, low illuminance turbidity".
+    CieClear {
+        towards_sun: DVec3,
+    },
+}
+
+impl Radiance {
+    fn towards(self, direction: DVec3) -> f64 {
+        match self {
+            Self::Uniform => 1.0,
+            Self::MoonSpencer => (1.0 + 2.0 * direction.z) / 3.0,
+            Self::CieClear { towards_sun } => {
+                // gradation phi(Z) and indicatrix f(chi), with the parameters of type 12
+                let (a, b, c, d, e) = (-1.0, -0.32, 10.0, -3.0, 0.45);
+                let gradation = |cos_zenith: f64| 1.0 + a * f64::exp(b / cos_zenith);
+                let indicatrix = |cos_chi: f64| {
+                    let chi = cos_chi.clamp(-1.0, 1.0).acos();
+                    1.0 + c * (f64::exp(d * chi) - f64::exp(d * FRAC_PI_2)) + e * cos_chi * cos_chi
+                };
+                gradation(direction.z) * indicatrix(direction.dot(towards_sun))
+                    / (gradation(1.0) * indicatrix(towards_sun.z))
+            }
+        }
+    }
+}
+
+/// A direction and the irradiance of its band of the sky, for a zenith radiance of 1.
+struct SkyPart {
+    towards: DVec3,
+    irradiance: f64,
+}
+
+fn parts_of_sky(radiance: Radiance, directions: NonZeroUsize, seed: u64) -> Vec<SkyPart> {
+    let mut rng = Pcg64::seed_from_u64(seed);
+    let first_azimuth = TAU * rng.random::<f64>();
+    let count = directions.get() as f64;
+    (0..directions.get())
+        .map(|band| {
+            // With mu = cos(zenith angle), the irradiance below mu is pi mu² under a uniform sky:
+            // a direction that is uniform in mu² within its band is unbiased.
+            let lower = (band as f64 / count).powi(2);
+            let upper = ((band + 1) as f64 / count).powi(2);
+            let mu_squared = lower + (upper - lower) * rng.random::<f64>();
+            let mu = mu_squared.sqrt().clamp(LOWEST_IN_BAND / count, 1.0);
+            let (sin_az, cos_az) = (first_azimuth + GOLDEN_ANGLE * band as f64).sin_cos();
+            let horizontal = (1.0 - mu * mu).sqrt();
+            let towards = DVec3::new(horizontal * cos_az, horizontal * sin_az, mu).normalize();
+            SkyPart {
+                towards,
+                irradiance: PI * (upper - lower) * radiance.towards(towards),
+            }
+        })
+        .collect()
+}
+
+/// Why a sky could not be made.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum SkyError {
+    /// Not a part of a whole.
+    #[error("diffuse fraction {value}: expected 0 to 1")]
+    DiffuseFraction {
+        /// As given.
+        value: f64,
+    },
+    /// Not an irradiance.
+    #[error("irradiance {value} W m-2: expected a finite number, not negative")]
+    Irradiance {
+        /// As given.
+        value: f64,
+    },
+    /// There is no sun at that time and place.
+    #[error(transparent)]
+    Sun(#[from] SunError),
+}
+
+#[cfg(test)]
+#[path = "sky_tests.rs"]
+mod tests;

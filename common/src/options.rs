@@ -1,0 +1,242 @@
+//! How to solve: what the command line and the scene file may both say.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// The options of a solve, each of them optional: the defaults are the plan's.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Options {
+    /// Diameter of the sphere within which exchange is computed on the true geometry.
+    pub diameter: Option<Diameter>,
+    /// Error to aim at, percent of an organ's absorbed power; above 0.
+    #[serde(rename = "accuracy_percent")]
+    pub accuracy_percent: Option<f64>,
+    /// Memory that a solve may take, GiB; above 0.
+    #[serde(rename = "memory_GiB")]
+    pub memory_GiB: Option<f64>,
+    /// Threads to compute with; 0 for as many as the machine has.
+    pub threads: Option<usize>,
+    /// Seed of all random choices.
+    pub seed: Option<u64>,
+    /// Form of the result tables.
+    pub format: Option<TableFormat>,
+    /// Write a file for ParaView too.
+    pub vtp: Option<bool>,
+}
+
+impl Options {
+    /// These options where they say something, the others elsewhere.
+    #[must_use]
+    pub fn over(self, other: Self) -> Self {
+        Self {
+            diameter: self.diameter.or(other.diameter),
+            accuracy_percent: self.accuracy_percent.or(other.accuracy_percent),
+            memory_GiB: self.memory_GiB.or(other.memory_GiB),
+            threads: self.threads.or(other.threads),
+            seed: self.seed.or(other.seed),
+            format: self.format.or(other.format),
+            vtp: self.vtp.or(other.vtp),
+        }
+    }
+
+    /// Refuses an accuracy or a memory that is not above zero.
+    pub fn check(&self) -> Result<(), OptionFault> {
+        for (name, value) in [
+            ("accuracy", self.accuracy_percent),
+            ("memory", self.memory_GiB),
+        ] {
+            if let Some(value) = value
+                && !(value.is_finite() && value > 0.0)
+            {
+                return Err(OptionFault {
+                    option: name,
+                    expected: "a number above 0",
+                    found: value.to_string(),
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// An option that cannot be.
+#[derive(Clone, Debug, Error, PartialEq)]
+#[error("{option}: expected {expected}, found {found}")]
+pub struct OptionFault {
+    /// Its name.
+    pub option: &'static str,
+    /// What it may be.
+    pub expected: &'static str,
+    /// What it was.
+    pub found: String,
+}
+
+/// The unit of length of geometry, pattern and soil height in the user's files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Unit {
+    /// Metres.
+    #[default]
+    #[serde(rename = "m")]
+    Metre,
+    /// Centimetres.
+    #[serde(rename = "cm")]
+    Centimetre,
+    /// Millimetres.
+    #[serde(rename = "mm")]
+    Millimetre,
+}
+
+impl Unit {
+    /// How many of it make a metre. Divide by this: unlike a product with 0.01, the quotient is the
+    /// double that is nearest to the true length.
+    pub fn per_metre(self) -> f64 {
+        match self {
+            Self::Metre => 1.0,
+            Self::Centimetre => 100.0,
+            Self::Millimetre => 1000.0,
+        }
+    }
+}
+
+impl FromStr for Unit {
+    type Err = OptionFault;
+
+    fn from_str(text: &str) -> Result<Self, OptionFault> {
+        match text {
+            "m" => Ok(Self::Metre),
+            "cm" => Ok(Self::Centimetre),
+            "mm" => Ok(Self::Millimetre),
+            _ => Err(OptionFault {
+                option: "unit",
+                expected: "m, cm or mm",
+                found: text.to_owned(),
+            }),
+        }
+    }
+}
+
+impl fmt::Display for Unit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Metre => "m",
+            Self::Centimetre => "cm",
+            Self::Millimetre => "mm",
+        })
+    }
+}
+
+/// The diameter of the near field.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "DiameterText", into = "DiameterText")]
+pub enum Diameter {
+    /// As the plan finds best.
+    #[default]
+    Auto,
+    /// Without bounds: no far field.
+    Infinite,
+    /// Metres, finite and above 0.
+    Metres(f64),
+}
+
+const DIAMETERS: &str = "auto, inf or a number of metres above 0";
+
+impl Diameter {
+    fn metres(value: f64) -> Option<Self> {
+        if value == f64::INFINITY {
+            return Some(Self::Infinite);
+        }
+        (value.is_finite() && value > 0.0).then_some(Self::Metres(value))
+    }
+}
+
+impl FromStr for Diameter {
+    type Err = OptionFault;
+
+    fn from_str(text: &str) -> Result<Self, OptionFault> {
+        let found = match text {
+            "auto" => Some(Self::Auto),
+            _ => text.parse().ok().and_then(Self::metres),
+        };
+        found.ok_or_else(|| OptionFault {
+            option: "diameter",
+            expected: DIAMETERS,
+            found: text.to_owned(),
+        })
+    }
+}
+
+impl fmt::Display for Diameter {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Auto => f.write_str("auto"),
+            Self::Infinite => f.write_str("inf"),
+            Self::Metres(metres) => write!(f, "{metres}"),
+        }
+    }
+}
+
+/// A diameter as files have it: a number, or a word.
+#[derive(Serialize, Deserialize)]
+#[serde(
+    untagged,
+    expecting = "expected auto, inf or a number of metres above 0"
+)]
+enum DiameterText {
+    Metres(f64),
+    Word(String),
+}
+
+impl TryFrom<DiameterText> for Diameter {
+    type Error = OptionFault;
+
+    fn try_from(text: DiameterText) -> Result<Self, OptionFault> {
+        match text {
+            DiameterText::Word(word) => word.parse(),
+            DiameterText::Metres(value) => Self::metres(value).ok_or_else(|| OptionFault {
+                option: "diameter",
+                expected: DIAMETERS,
+                found: value.to_string(),
+            }),
+        }
+    }
+}
+
+impl From<Diameter> for DiameterText {
+    fn from(diameter: Diameter) -> Self {
+        match diameter {
+            Diameter::Metres(metres) => Self::Metres(metres),
+            word => Self::Word(word.to_string()),
+        }
+    }
+}
+
+/// The form of the result tables.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum TableFormat {
+    /// Comma-separated text.
+    #[default]
+    Csv,
+    /// Apache Parquet.
+    Parquet,
+}
+
+impl FromStr for TableFormat {
+    type Err = OptionFault;
+
+    fn from_str(text: &str) -> Result<Self, OptionFault> {
+        match text {
+            "csv" => Ok(Self::Csv),
+            "parquet" => Ok(Self::Parquet),
+            _ => Err(OptionFault {
+                option: "format",
+                expected: "csv or parquet",
+                found: text.to_owned(),
+            }),
+        }
+    }
+}

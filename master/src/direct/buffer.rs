@@ -1,0 +1,83 @@
+//! What is on top, for every point of a lattice.
+
+use std::ops::Range;
+
+use glam::DVec3;
+use nestrad_common::elements::{self, Elements};
+use nestrad_common::lattice::{Lattice, Projected, Strips};
+
+/// The element on top, and the face that it shows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Top {
+    pub(super) element: u32,
+    pub(super) upper: bool,
+}
+
+/// A z-buffer for one strip of a lattice.
+#[derive(Default)]
+pub(super) struct Buffer {
+    /// depth, element, side; 0 where nothing is hit
+    key: Vec<u64>,
+}
+
+/// Points in a strip: its buffer fits a second-level cache.
+const LINES_IN_STRIP: usize = 1 << 16;
+
+impl Buffer {
+    /// Draws all triangles strip by strip. `drawn` is called for each point of each element, `strip`
+    /// with the rows of each finished strip.
+    ///
+    /// `floor_m`: the height of the soil, which hides what lies below it.
+    pub(super) fn draw(
+        &mut self,
+        lattice: &Lattice,
+        triangles: &[[DVec3; 3]],
+        elements: &Elements,
+        floor_m: Option<f64>,
+        mut drawn: impl FnMut(u32),
+        mut strip: impl FnMut(&Self, Range<u32>),
+    ) {
+        let floor = u64::from(floor_m.map_or(0, |z| lattice.depth_of_height(z))) << 32;
+        let strips = Strips::new(lattice, triangles, LINES_IN_STRIP);
+        let nx = lattice.nx as usize;
+        for s in 0..strips.len() {
+            let rows = strips.rows(s);
+            let first_line = rows.start as usize * nx;
+            self.key.clear();
+            self.key.resize(rows.len() * nx, floor);
+            for t in strips.triangles(s) {
+                let t = t as usize;
+                let Some(projected) = Projected::new(lattice, &triangles[t]) else {
+                    continue;
+                };
+                let (first, n) = (elements.first[t], elements.divisions[t]);
+                projected.scan(lattice, rows.clone(), n > 1, |f| {
+                    let element = if n > 1 {
+                        first + elements::piece(n, f.place[0], f.place[1])
+                    } else {
+                        first
+                    };
+                    drawn(element);
+                    // element + 1: a hit at depth 0 still counts as one
+                    let key = u64::from(f.depth) << 32
+                        | u64::from(element + 1) << 1
+                        | u64::from(projected.upper_along);
+                    let top = &mut self.key[f.line - first_line];
+                    *top = (*top).max(key);
+                });
+            }
+            strip(self, rows);
+        }
+    }
+
+    /// What is on top at a point of the strip, by its place in it.
+    pub(super) fn top(&self, point: usize) -> Option<Top> {
+        let key = self.key[point] as u32;
+        let element = (key >> 1).checked_sub(1)?;
+        // lines point towards the source: the face that looks along them is lit
+        Some(Top {
+            element,
+            upper: key & 1 == 1,
+        })
+    }
+}

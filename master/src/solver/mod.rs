@@ -1,0 +1,194 @@
+//! Gauss-Seidel over two independent halves of the exchange.
+//!
+//! With F_A and F_B estimated from two independent halves of the lines, and S the scattering of a face
+//! (rho to the same side, tau to the other), the unknowns are the irradiances x and y in
+//!
+//! ```text
+//! x = E0 + F_A S y        y = E0 + F_B S x        E = (x + y) / 2
+//! ```
+//!
+//! Light that goes from i to j and back goes there by one half and back by the other, so a chance
+//! excess of lines between i and j is not squared: that removes the bias that one set of lines, used
+//! both ways, has in multiple scattering, and every line still serves both its ends. All x depend on y
+//! alone and all y on x alone, so a pass is a parallel Gauss-Seidel sweep (a red-black one) with one
+//! result for any number of threads. The pair is 2-cyclic and consistently ordered, so Young's theory
+//! of over-relaxation holds exactly (Young 1971; Hageman & Young 1981, chapter 9).
+
+mod relaxation;
+mod sweep;
+
+use nestrad_common::problem::Problem;
+use thiserror::Error;
+
+use crate::exchange::Exchange;
+use crate::world::World;
+pub use sweep::Gather;
+
+/// When to stop.
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
+pub struct Tolerance {
+    /// What is left to change in the power that each band absorbs, summed over all faces without
+    /// regard to sign, relative to the incoming power.
+    pub absorbed: f64,
+    /// Passes over all rows before the solve is given up.
+    pub most_passes: u32,
+}
+
+/// Why there is no solution.
+#[derive(Debug, Error, PartialEq)]
+pub enum SolveError {
+    /// The tolerance was not reached.
+    #[error(
+        "the exchange did not converge in {passes} passes: band {band} may still change by {left:.3e} of its incoming power, expected {wanted:.1e}"
+    )]
+    NotConverged {
+        /// Name of the band.
+        band: String,
+        /// Passes done.
+        passes: u32,
+        /// Estimated remaining change.
+        left: f64,
+        /// Tolerance.
+        wanted: f64,
+    },
+}
+
+/// Irradiances of all rows, in both halves.
+#[derive(Clone, Debug, Default)]
+pub struct Irradiance {
+    /// From the first and from the second half, W m⁻², indexed `row * bands + band`.
+    pub halves: [Vec<f64>; 2],
+    /// Bands, as indexed here.
+    pub bands: usize,
+    /// Passes over all rows that it took.
+    pub passes: u32,
+    /// Estimated remaining change of absorbed power relative to incoming, per band.
+    pub left: Vec<f64>,
+}
+
+impl Irradiance {
+    /// The mean of both halves.
+    pub fn mean(&self, row: usize, band: usize) -> f64 {
+        let k = row * self.bands + band;
+        0.5 * (self.halves[0][k] + self.halves[1][k])
+    }
+}
+
+/// Solves for the irradiance of all rows in the given bands.
+///
+/// `direct_W_m2`: E0, indexed `row * all bands + band`. `fixed_W_m2`: radiosity of the ends that are
+/// not rows (sky, void, outer soil, far field), indexed `(end - rows) * all bands + band`.
+pub fn solve(
+    problem: &Problem,
+    world: &World,
+    exchange: &Exchange,
+    direct_W_m2: &[f64],
+    fixed_W_m2: &[f64],
+    bands: &[usize],
+    incoming_W: &[f64],
+    tolerance: &Tolerance,
+) -> Result<Irradiance, SolveError> {
+    let mut all = Irradiance {
+        halves: [
+            vec![0.0; world.rows() * bands.len()],
+            vec![0.0; world.rows() * bands.len()],
+        ],
+        bands: bands.len(),
+        passes: 0,
+        left: vec![0.0; bands.len()],
+    };
+    let mut done = 0;
+    while done < bands.len() {
+        let group = &bands[done..(done + WIDEST).min(bands.len())];
+        let part = Group {
+            problem,
+            world,
+            exchange,
+            direct_W_m2,
+            fixed_W_m2,
+            bands: group,
+            incoming_W,
+            tolerance,
+        };
+        match group.len() {
+            1 => part.solve::<1>(done, &mut all)?,
+            2 => part.solve::<2>(done, &mut all)?,
+            3 | 4 => part.solve::<4>(done, &mut all)?,
+            _ => part.solve::<WIDEST>(done, &mut all)?,
+        }
+        done += group.len();
+    }
+    Ok(all)
+}
+
+/// Bands that are solved in one pass over the rows.
+const WIDEST: usize = 8;
+
+struct Group<'a> {
+    problem: &'a Problem,
+    world: &'a World,
+    exchange: &'a Exchange,
+    direct_W_m2: &'a [f64],
+    fixed_W_m2: &'a [f64],
+    bands: &'a [usize],
+    incoming_W: &'a [f64],
+    tolerance: &'a Tolerance,
+}
+
+impl Group<'_> {
+    fn solve<const N: usize>(&self, first: usize, all: &mut Irradiance) -> Result<(), SolveError> {
+        let total = self.problem.bands.len();
+        let lanes = |values: &[f64]| -> Vec<[f64; N]> {
+            values
+                .chunks_exact(total)
+                .map(|v| std::array::from_fn(|k| self.bands.get(k).map_or(0.0, |&b| v[b])))
+                .collect()
+        };
+        let gather = Gather::<N>::new(self.problem, self.world, self.bands);
+        let direct = lanes(self.direct_W_m2);
+        let fixed = lanes(self.fixed_W_m2);
+        let (a, b) = self
+            .exchange
+            .batches
+            .split_at(self.exchange.batches.len() / 2);
+        let mut x = gather.start(direct.clone(), &fixed);
+        let mut y = gather.start(direct.clone(), &fixed);
+
+        let mut relaxation = [relaxation::Relaxation::new(); N];
+        let mut left = vec![f64::INFINITY; self.bands.len()];
+        let mut passes = 0;
+        while passes < self.tolerance.most_passes {
+            let omega = relaxation.map(|r| r.omega);
+            let from_a = gather.sweep(a, &y.radiosity, &direct, &omega, &mut x);
+            let from_b = gather.sweep(b, &x.radiosity, &direct, &omega, &mut y);
+            passes += 1;
+            for (k, left) in left.iter_mut().enumerate() {
+                let incoming = self.incoming_W[self.bands[k]].max(f64::MIN_POSITIVE);
+                *left = relaxation[k].after(0.5 * (from_a[k] + from_b[k]) / incoming);
+            }
+            if left.iter().all(|&l| l <= self.tolerance.absorbed) {
+                break;
+            }
+        }
+        for (k, &l) in left.iter().enumerate() {
+            if !(l <= self.tolerance.absorbed) {
+                return Err(SolveError::NotConverged {
+                    band: self.problem.bands[self.bands[k]].name.clone(),
+                    passes,
+                    left: l,
+                    wanted: self.tolerance.absorbed,
+                });
+            }
+            all.left[first + k] = l;
+        }
+        all.passes = all.passes.max(passes);
+        for (half, from) in all.halves.iter_mut().zip([&x, &y]) {
+            for (row, lane) in from.irradiance.iter().enumerate() {
+                for k in 0..self.bands.len() {
+                    half[row * all.bands + first + k] = lane[k];
+                }
+            }
+        }
+        Ok(())
+    }
+}

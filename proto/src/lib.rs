@@ -1,0 +1,13 @@
+//! The messages that master and workers exchange, generated from `nestrad/v1/*.proto`, which
+//! documents them field by field.
+
+#![allow(non_snake_case, reason = "units in names are written as units")]
+
+/// Version 1 of the protocol.
+pub mod v1 {
+    #![allow(
+        missing_docs,
+        reason = "generated: the .proto files document every field"
+    )]
+    include!(concat!(env!("OUT_DIR"), "/nestrad.v1.rs"));
+}

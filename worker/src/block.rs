@@ -1,0 +1,236 @@
+//! A block, checked and made ready for the kernel.
+
+use glam::{DVec2, DVec3};
+use nestrad_common::ends::Ends;
+use nestrad_common::geometry;
+use nestrad_common::lattice::Extent;
+use nestrad_proto::v1;
+use thiserror::Error;
+
+/// No row is wanted for this end.
+pub(crate) const NO_ROW: u32 = u32::MAX;
+
+/// Geometry of a job.
+///
+/// Inside a block, faces are numbered by their place in the block ("local ends"): the two faces of
+/// each local element, then everything that is not a face, in the order of [`Ends`].
+pub struct Block {
+    /// Where lines run.
+    pub(crate) extent: Extent,
+    /// Numbering of the whole scene.
+    pub(crate) ends: Ends,
+    pub(crate) soil: Option<Soil>,
+    pub(crate) radius_m: f64,
+    pub(crate) triangles: Vec<[DVec3; 3]>,
+    /// First local element of each triangle, and their number at the end.
+    pub(crate) first: Vec<u32>,
+    pub(crate) divisions: Vec<u32>,
+    /// Number in the scene of each local element.
+    pub(crate) element: Vec<u32>,
+    /// One-sided area of each local element, m².
+    pub(crate) area_m2: Vec<f64>,
+    /// Row of each local face and of each soil cell, or [`NO_ROW`].
+    pub(crate) row: Vec<u32>,
+    /// Number of rows.
+    pub(crate) rows: usize,
+}
+
+/// The mapped soil plane.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Soil {
+    pub(crate) z_m: f64,
+    pub(crate) min_m: DVec2,
+    pub(crate) cell_m: DVec2,
+    pub(crate) cells: [u32; 2],
+}
+
+/// Why a block was refused.
+#[derive(Debug, Error, PartialEq, Eq)]
+pub enum BlockFault {
+    /// A message that must be there is not.
+    #[error("block without {0}")]
+    Missing(&'static str),
+    /// Arrays that describe the same triangles differ in length.
+    #[error("block lists {found} {what}, expected {expected}")]
+    Length {
+        /// What is listed.
+        what: &'static str,
+        /// How many there are.
+        found: usize,
+        /// How many there should be.
+        expected: usize,
+    },
+    /// A number is out of its range.
+    #[error("block with {what} out of range")]
+    Range {
+        /// What is out of range.
+        what: &'static str,
+    },
+}
+
+impl Block {
+    /// Checks a block; nothing in it is trusted.
+    pub fn new(block: &v1::Block) -> Result<Self, BlockFault> {
+        let world = block.world.as_ref().ok_or(BlockFault::Missing("world"))?;
+        let min_m = vector(world.min_m.as_ref(), "min_m")?;
+        let max_m = vector(world.max_m.as_ref(), "max_m")?;
+        require(min_m.cmple(max_m).all(), "extent")?;
+        require(world.sphere_radius_m >= 0.0, "sphere_radius_m")?;
+        require(
+            world.far_bins <= 64 && world.far_levels <= 1 << 16,
+            "far field",
+        )?;
+        let soil = world.soil.as_ref().map(soil_plane).transpose()?;
+        let soil_cells = soil.map_or(0, |s| s.cells[0] * s.cells[1]);
+        require(world.elements <= 1 << 30, "elements")?;
+        let ends = Ends {
+            elements: world.elements,
+            soil_cells,
+            far_levels: world.far_levels,
+            far_bins: world.far_bins,
+        };
+
+        let count = block.divisions.len();
+        same_length("vertex coordinates", block.vertices_m.len(), 9 * count)?;
+        same_length("first elements", block.first_element.len(), count)?;
+        same_length("owner flags", block.owned.len(), count)?;
+        require(block.vertices_m.iter().all(|x| x.is_finite()), "vertices_m")?;
+        let triangles: Vec<[DVec3; 3]> = block
+            .vertices_m
+            .chunks_exact(9)
+            .map(|c| [0, 3, 6].map(|k| DVec3::new(c[k], c[k + 1], c[k + 2])))
+            .collect();
+
+        let mut first = Vec::with_capacity(count + 1);
+        let (mut element, mut area_m2, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        let mut rows = 0;
+        let mut next = 0;
+        for (t, &n) in block.divisions.iter().enumerate() {
+            let start = block.first_element[t];
+            require(
+                (1..=nestrad_common::elements::MAX_DIVISIONS).contains(&n),
+                "divisions",
+            )?;
+            require(
+                start >= next && u64::from(start) + u64::from(n * n) <= u64::from(world.elements),
+                "first_element",
+            )?;
+            next = start + n * n;
+            first.push(element.len() as u32);
+            element.extend(start..next);
+            area_m2.extend(std::iter::repeat_n(
+                geometry::area(&triangles[t]) / f64::from(n * n),
+                (n * n) as usize,
+            ));
+            for _ in 0..2 * n * n {
+                row.push(if block.owned[t] { rows } else { NO_ROW });
+                rows += u32::from(block.owned[t]);
+            }
+        }
+        first.push(element.len() as u32);
+        let cells_at = row.len();
+        row.resize(cells_at + soil_cells as usize, NO_ROW);
+        for &cell in &block.owned_soil_cells {
+            require(cell < soil_cells, "owned_soil_cells")?;
+            row[cells_at + cell as usize] = rows;
+            rows += 1;
+        }
+        Ok(Self {
+            extent: Extent {
+                min_m,
+                max_m,
+                periodic: world.periodic,
+            },
+            ends,
+            soil,
+            radius_m: world.sphere_radius_m,
+            triangles,
+            first,
+            divisions: block.divisions.clone(),
+            element,
+            area_m2,
+            row,
+            rows: rows as usize,
+        })
+    }
+
+    /// Faces of local elements; local ends from here on are not faces.
+    pub(crate) fn local_faces(&self) -> u32 {
+        2 * self.element.len() as u32
+    }
+
+    /// The local number of an end that is not a face.
+    pub(crate) fn local(&self, end: u32) -> u32 {
+        end - self.ends.faces() + self.local_faces()
+    }
+
+    /// The number in the scene of a local end.
+    pub(crate) fn global(&self, local: u32) -> u32 {
+        match self.element.get(local as usize / 2) {
+            Some(element) => 2 * element + local % 2,
+            None => local - self.local_faces() + self.ends.faces(),
+        }
+    }
+
+    /// How far away a copy of the scene lies, metres.
+    pub(crate) fn shift_m(&self, copy: [i64; 2]) -> DVec3 {
+        let size = self.extent.max_m - self.extent.min_m;
+        DVec3::new(copy[0] as f64 * size.x, copy[1] as f64 * size.y, 0.0)
+    }
+
+    /// The row of a local end, if it has one here.
+    pub(crate) fn row_of(&self, local: u32) -> Option<usize> {
+        self.row
+            .get(local as usize)
+            .filter(|&&r| r != NO_ROW)
+            .map(|&r| r as usize)
+    }
+}
+
+fn vector(v: Option<&v1::Vector>, name: &'static str) -> Result<DVec3, BlockFault> {
+    let v = v.ok_or(BlockFault::Missing(name))?;
+    let v = DVec3::new(v.x, v.y, v.z);
+    require(v.is_finite(), name)?;
+    Ok(v)
+}
+
+fn soil_plane(soil: &v1::SoilPlane) -> Result<Soil, BlockFault> {
+    let min_m = DVec2::new(soil.min_x_m, soil.min_y_m);
+    let cell_m = DVec2::new(soil.cell_x_m, soil.cell_y_m);
+    require(min_m.is_finite() && soil.z_m.is_finite(), "soil")?;
+    require(
+        cell_m.is_finite() && cell_m.cmpgt(DVec2::ZERO).all(),
+        "soil cell",
+    )?;
+    let cells = [soil.cells_x, soil.cells_y];
+    require(
+        cells.iter().all(|c| (1..=1 << 14).contains(c)),
+        "soil cells",
+    )?;
+    Ok(Soil {
+        z_m: soil.z_m,
+        min_m,
+        cell_m,
+        cells,
+    })
+}
+
+fn require(holds: bool, what: &'static str) -> Result<(), BlockFault> {
+    if holds {
+        Ok(())
+    } else {
+        Err(BlockFault::Range { what })
+    }
+}
+
+fn same_length(what: &'static str, found: usize, expected: usize) -> Result<(), BlockFault> {
+    if found == expected {
+        Ok(())
+    } else {
+        Err(BlockFault::Length {
+            what,
+            found,
+            expected,
+        })
+    }
+}

@@ -1,0 +1,25 @@
+//! The near-field kernel: for every face of a block, what it sees.
+//!
+//! A job is self-contained (a block of geometry with all that lies within the sphere's radius of it,
+//! and a batch of directions); its result is the rows of the exchange matrix, one end per line or
+//! ray, all of equal weight. The same job gives the same rows to the last bit, on any machine and
+//! for any number of threads.
+
+mod block;
+mod lines;
+mod rays;
+mod rows;
+
+pub use block::{Block, BlockFault};
+pub use rays::Tracer;
+
+use nestrad_proto::v1;
+
+/// Computes one batch of a block.
+///
+/// `tracer` holds the acceleration structure of the block's geometry; build it once per block.
+pub fn trace(block: &Block, tracer: &Tracer, batch: &v1::Batch) -> v1::Rows {
+    let mut traced = lines::trace(block, batch);
+    rays::complete(block, tracer, batch, &mut traced);
+    rows::collect(block, &traced)
+}

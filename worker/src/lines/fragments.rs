@@ -1,0 +1,124 @@
+//! The hits of every line of a lattice, sorted along it.
+//!
+//! The lattice is worked off in strips of whole rows, small enough that a strip's fragments stay in
+//! the cache. Within a strip fragments are sorted by line with a counting sort, then by depth.
+
+use nestrad_common::elements;
+use nestrad_common::lattice::{Lattice, Projected, Strips};
+
+use crate::block::Block;
+
+/// Where a line meets the block: depth along the line, local element, and which face it meets.
+///
+/// Packed so that hits sort by depth, then by element: the order does not depend on the order of
+/// drawing.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub(crate) struct Hit(u64);
+
+impl Hit {
+    fn new(depth: u32, local_element: u32, upper_along: bool) -> Self {
+        Self(u64::from(depth) << 32 | u64::from(local_element) << 1 | u64::from(upper_along))
+    }
+
+    /// In steps of the lattice's depth.
+    pub(crate) fn depth(self) -> u32 {
+        (self.0 >> 32) as u32
+    }
+
+    /// The local face that looks along the direction of the lines.
+    pub(crate) fn face_along(self) -> u32 {
+        self.face_against() ^ 1
+    }
+
+    /// The local face that looks against the direction of the lines.
+    pub(crate) fn face_against(self) -> u32 {
+        // bit 0 is set when the upper face looks along: then the lower face (odd) looks against
+        self.0 as u32
+    }
+}
+
+/// Lines in a strip: with some ten hits each, a strip's fragments fit a second-level cache.
+const LINES_IN_STRIP: usize = 1 << 14;
+
+/// Calls `line` with the hits of every line of the lattice, by rising depth; lines by rising number.
+pub(crate) fn for_each_line(block: &Block, lattice: &Lattice, mut line: impl FnMut(usize, &[Hit])) {
+    let strips = Strips::new(lattice, &block.triangles, LINES_IN_STRIP);
+    let mut strip = Strip::default();
+    for s in 0..strips.len() {
+        strip.draw(block, lattice, strips.rows(s), strips.triangles(s));
+        strip.sort();
+        strip.for_each_line(&mut line);
+    }
+}
+
+/// Fragments of one strip of the lattice; buffers are kept from strip to strip.
+#[derive(Default)]
+struct Strip {
+    first_line: usize,
+    /// (line within the strip, hit), as drawn.
+    drawn: Vec<(u32, Hit)>,
+    /// End of each line's hits in `hits`, after sorting.
+    end: Vec<u32>,
+    hits: Vec<Hit>,
+}
+
+impl Strip {
+    fn draw(
+        &mut self,
+        block: &Block,
+        lattice: &Lattice,
+        rows: std::ops::Range<u32>,
+        triangles: impl Iterator<Item = u32>,
+    ) {
+        let nx = lattice.nx as usize;
+        self.first_line = rows.start as usize * nx;
+        self.drawn.clear();
+        self.end.clear();
+        self.end.resize((rows.end - rows.start) as usize * nx, 0);
+        for t in triangles {
+            let t = t as usize;
+            let Some(projected) = Projected::new(lattice, &block.triangles[t]) else {
+                continue;
+            };
+            let (first, n) = (block.first[t], block.divisions[t]);
+            projected.scan(lattice, rows.clone(), n > 1, |f| {
+                let element = if n > 1 {
+                    first + elements::piece(n, f.place[0], f.place[1])
+                } else {
+                    first
+                };
+                let line = f.line - self.first_line;
+                self.end[line] += 1;
+                self.drawn.push((
+                    line as u32,
+                    Hit::new(f.depth, element, projected.upper_along),
+                ));
+            });
+        }
+    }
+
+    fn sort(&mut self) {
+        let mut total = 0;
+        for end in &mut self.end {
+            let count = *end;
+            *end = total;
+            total += count;
+        }
+        self.hits.resize(total as usize, Hit::default());
+        for &(line, hit) in &self.drawn {
+            let place = &mut self.end[line as usize];
+            self.hits[*place as usize] = hit;
+            *place += 1;
+        }
+    }
+
+    fn for_each_line(&mut self, line: &mut impl FnMut(usize, &[Hit])) {
+        let mut start = 0;
+        for (k, &end) in self.end.iter().enumerate() {
+            let hits = &mut self.hits[start..end as usize];
+            hits.sort_unstable();
+            line(self.first_line + k, hits);
+            start = end as usize;
+        }
+    }
+}

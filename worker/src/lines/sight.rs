@@ -1,0 +1,142 @@
+//! Who sees whom along a line.
+
+use nestrad_common::lattice::{DEPTH_OF_TOP, Lattice};
+
+use super::fragments::Hit;
+use crate::block::{Block, Soil};
+use crate::rows::Pair;
+
+/// Turns the sorted hits of a line into pairs that see each other.
+pub(crate) struct Sight<'a> {
+    block: &'a Block,
+    soil: Option<SoilUnder>,
+    sky: u32,
+    below: u32,
+    /// The sphere's radius in depth steps; `None` when nothing is ever that far away.
+    radius: Option<u32>,
+    bin: u32,
+}
+
+impl<'a> Sight<'a> {
+    pub(crate) fn new(block: &'a Block, lattice: &Lattice) -> Self {
+        let ends = &block.ends;
+        let steps = (block.radius_m / lattice.distance_m(1)).ceil();
+        let cosine = lattice.direction.z;
+        Self {
+            block,
+            soil: block.soil.map(|soil| SoilUnder::new(&soil, lattice)),
+            sky: block.local(ends.sky()),
+            below: block.local(if block.soil.is_some() {
+                ends.outer_soil()
+            } else {
+                ends.void()
+            }),
+            radius: (steps < f64::from(u32::MAX)).then_some(steps as u32),
+            bin: ((cosine * f64::from(ends.far_bins)) as u32).min(ends.far_bins.saturating_sub(1)),
+        }
+    }
+
+    /// Adds the pairs along one line; `hits` by rising depth.
+    pub(crate) fn along(&self, line: usize, hits: &[Hit], pairs: &mut Vec<Pair>) {
+        let bottom = match &self.soil {
+            Some(soil) => soil
+                .cell(line)
+                .map_or(self.below, |c| self.block.local(self.block.ends.soil(c))),
+            None => self.below,
+        };
+        // what lies under the soil sees nothing and is not seen
+        let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
+        let hits = &hits[hits.partition_point(|h| h.depth() < soil_depth)..];
+        let Some(radius) = self.radius else {
+            let mut seen = bottom;
+            for hit in hits {
+                pairs.push((seen, hit.face_against()));
+                seen = hit.face_along();
+            }
+            pairs.push((seen, self.sky));
+            return;
+        };
+
+        let (mut seen, mut depth) = (bottom, soil_depth);
+        for hit in hits {
+            if hit.depth().saturating_sub(depth) <= radius {
+                pairs.push((seen, hit.face_against()));
+            } else {
+                pairs.push((seen, self.far_above(line, depth, radius)));
+                pairs.push((
+                    hit.face_against(),
+                    self.far_below(line, hit.depth(), radius),
+                ));
+            }
+            (seen, depth) = (hit.face_along(), hit.depth());
+        }
+        pairs.push((seen, self.far_above(line, depth, radius)));
+    }
+
+    /// What is seen upwards, where nothing is hit within the sphere.
+    fn far_above(&self, line: usize, depth: u32, radius: u32) -> u32 {
+        match depth.checked_add(radius) {
+            Some(at) if at < DEPTH_OF_TOP => {
+                let level = self.level(line, at);
+                self.block
+                    .local(self.block.ends.far_from_above(self.bin, level))
+            }
+            _ => self.sky,
+        }
+    }
+
+    /// What is seen downwards, where nothing is hit within the sphere.
+    fn far_below(&self, line: usize, depth: u32, radius: u32) -> u32 {
+        let level = self.level(line, depth.saturating_sub(radius));
+        self.block
+            .local(self.block.ends.far_from_below(self.bin, level))
+    }
+
+    /// One of the two levels around a depth, at random with the weights of linear interpolation:
+    /// so the mean over lines is the interpolated value, and every end keeps the same weight.
+    fn level(&self, line: usize, depth: u32) -> u32 {
+        let last = self.block.ends.far_levels.saturating_sub(1);
+        let at = f64::from(depth) / f64::from(DEPTH_OF_TOP) * f64::from(last);
+        let hash = ((line as u64) << 32 | u64::from(depth)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let random = (hash >> 11) as f64 / (1u64 << 53) as f64;
+        ((at + random) as u32).min(last)
+    }
+}
+
+/// The soil cells at the lower ends of the lines.
+struct SoilUnder {
+    depth: u32,
+    /// Column and row of cells for each column and row of the lattice; `None` beyond the map.
+    column: Vec<Option<u32>>,
+    row: Vec<Option<u32>>,
+    columns: u32,
+}
+
+impl SoilUnder {
+    fn new(soil: &Soil, lattice: &Lattice) -> Self {
+        let cell = |x: f64, min: f64, size: f64, cells: u32| {
+            let k = ((x - min) / size).floor();
+            if lattice.periodic {
+                Some((k as i64).rem_euclid(i64::from(cells)) as u32)
+            } else {
+                (k >= 0.0 && k < f64::from(cells)).then_some(k as u32)
+            }
+        };
+        let place = |i: u32, j: u32| lattice.point_at(f64::from(i), f64::from(j), soil.z_m);
+        Self {
+            depth: lattice.depth_of_height(soil.z_m),
+            column: (0..lattice.nx)
+                .map(|i| cell(place(i, 0).x, soil.min_m.x, soil.cell_m.x, soil.cells[0]))
+                .collect(),
+            row: (0..lattice.ny)
+                .map(|j| cell(place(0, j).y, soil.min_m.y, soil.cell_m.y, soil.cells[1]))
+                .collect(),
+            columns: soil.cells[0],
+        }
+    }
+
+    fn cell(&self, line: usize) -> Option<u32> {
+        let nx = self.column.len();
+        Some(self.row[line / nx]? * self.columns + self.column[line % nx]?)
+    }
+}

@@ -1,0 +1,121 @@
+//! Rays from the faces themselves: they complete the faces that the lines sample too thinly, and over
+//! all faces they are the independent estimator that the lines are tested against.
+
+mod tracer;
+
+use glam::DVec3;
+use nestrad_common::directions::{Purpose, stream};
+use nestrad_common::elements;
+use nestrad_proto::v1;
+use rand::RngExt;
+use rand_pcg::Pcg64Mcg;
+use rayon::prelude::*;
+
+use crate::block::Block;
+use crate::rows::{Pair, Traced};
+use tracer::FaceRay;
+pub use tracer::Tracer;
+
+/// Triangles whose rays are cast as one task.
+const TASK: usize = 256;
+
+/// Adds what rays see to what lines saw.
+pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced: &mut Traced) {
+    let Some(rays) = &batch.rays else { return };
+    let plan = Plan {
+        rays,
+        batch: batch.index,
+        lines_per_m2: 0.5 * batch.lines.len() as f64 * f64::from(rays.batches_in_half)
+            / batch.line_area_m2,
+    };
+    let tasks = block.triangles.len().div_ceil(TASK);
+    let looks: Vec<Vec<Pair>> = (0..tasks)
+        .into_par_iter()
+        .map(|task| {
+            let mut looks = Vec::new();
+            for t in task * TASK..((task + 1) * TASK).min(block.triangles.len()) {
+                from_triangle(block, tracer, &plan, t, &mut looks);
+            }
+            looks
+        })
+        .collect();
+    traced.looks = looks.concat();
+    traced.rays = traced.looks.len() as u64;
+}
+
+struct Plan<'a> {
+    rays: &'a v1::Rays,
+    batch: u32,
+    /// Lines of a half that meet a square metre of leaf, on average over its inclination: a line
+    /// sees |cos| of the area, whose mean over the hemisphere is 1/2.
+    lines_per_m2: f64,
+}
+
+impl Plan<'_> {
+    /// Rays in this batch for a face of that area: those of the half are dealt out in turn.
+    fn rays_of(&self, area_m2: f64, face: u32) -> u32 {
+        let missing = (self.rays.least_samples - area_m2 * self.lines_per_m2)
+            .ceil()
+            .max(0.0) as u32;
+        let batches = self.rays.batches_in_half.max(1);
+        let turn = (self.batch % batches + face % batches) % batches;
+        missing / batches + u32::from(turn < missing % batches)
+    }
+}
+
+fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &mut Vec<Pair>) {
+    let triangle = &block.triangles[t];
+    let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+    let Some(normal) = normal.try_normalize() else {
+        return;
+    };
+    let n = block.divisions[t];
+    for local in block.first[t]..block.first[t + 1] {
+        for side in 0..2 {
+            let face = 2 * local + side;
+            let global = block.global(face);
+            if block.row_of(face).is_none() {
+                continue;
+            }
+            let count = plan.rays_of(block.area_m2[local as usize], global);
+            if count == 0 {
+                continue;
+            }
+            let index = u64::from(plan.batch) << 32 | u64::from(global);
+            let mut rng = stream(plan.rays.seed, Purpose::Rays, index);
+            let outward = if side == 0 { normal } else { -normal };
+            let corners = elements::piece_corners(n, local - block.first[t]);
+            for k in 0..count {
+                let origin = point(triangle, &corners, &mut rng);
+                let direction = cosine_direction(outward, (k, count), &mut rng);
+                let ray = FaceRay {
+                    origin,
+                    direction,
+                    source: t as u32,
+                };
+                looks.push((face, tracer.seen(block, &ray, rng.random())));
+            }
+        }
+    }
+}
+
+/// A point uniform over the piece with these barycentric corners.
+fn point(triangle: &[DVec3; 3], corners: &[(f64, f64); 3], rng: &mut Pcg64Mcg) -> DVec3 {
+    // square-root map of the unit square to a triangle (Turk 1990)
+    let (r1, r2): (f64, f64) = (rng.random(), rng.random());
+    let (w1, w2) = (r1.sqrt() * (1.0 - r2), r1.sqrt() * r2);
+    let w0 = 1.0 - w1 - w2;
+    let b1 = w0 * corners[0].0 + w1 * corners[1].0 + w2 * corners[2].0;
+    let b2 = w0 * corners[0].1 + w1 * corners[1].1 + w2 * corners[2].1;
+    triangle[0] + b1 * (triangle[1] - triangle[0]) + b2 * (triangle[2] - triangle[0])
+}
+
+/// A direction whose density is the cosine to `normal` over pi (Malley's method); the squared sines
+/// of the `count` directions of a face are stratified.
+fn cosine_direction(normal: DVec3, (k, count): (u32, u32), rng: &mut Pcg64Mcg) -> DVec3 {
+    let u: f64 = (f64::from(k) + rng.random::<f64>()) / f64::from(count);
+    let azimuth: f64 = std::f64::consts::TAU * rng.random::<f64>();
+    let (e1, e2) = normal.any_orthonormal_pair();
+    let r = u.sqrt();
+    e1 * (r * azimuth.cos()) + e2 * (r * azimuth.sin()) + normal * (1.0 - u).max(1e-12).sqrt()
+}
