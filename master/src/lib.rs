@@ -6,4 +6,5 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod far_field;
 pub mod solution;
