@@ -194,6 +194,9 @@ impl Lu {
     pub(super) fn solve(&self, mut right: Matrix) -> Matrix {
         let n = self.factors.rows;
         let cols = right.cols;
+        if cols == 0 {
+            return right;
+        }
         for i in 0..n {
             let (known, rest) = right.data.split_at_mut(i * cols);
             let row = &mut rest[..cols];

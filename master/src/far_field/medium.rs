@@ -137,15 +137,22 @@ impl<'a> Medium<'a> {
             add(&mut intercepted, &leaves.met(onto));
         }
         // Vertical leaves under a vertical beam meet nothing of it.
-        let ratio = |a: f64, b: f64| if a > 0.0 { a / b } else { 0.0 };
-        let per_met: Vec<f64> = intercepted.iter().map(|&i| ratio(1.0, i)).collect();
+        let share = |part: f64, met: f64| {
+            if met >= f64::MIN_POSITIVE {
+                part / met
+            } else {
+                0.0
+            }
+        };
+        let per_met: Vec<f64> = intercepted.iter().map(|&met| share(1.0, met)).collect();
         beam_scatter.scale_columns(&per_met);
+        let depth = |met: f64, mu: f64| if met > 0.0 { met / mu } else { 0.0 };
         any.then(|| LayerOptics {
             interaction,
             absorption,
-            beam_depth: zip_map(&intercepted, &self.beams.mu, ratio),
+            beam_depth: zip_map(&intercepted, &self.beams.mu, depth),
             beam_scatter,
-            beam_absorption: zip_map(&beam_absorption, &intercepted, ratio),
+            beam_absorption: zip_map(&beam_absorption, &intercepted, share),
         })
     }
 

@@ -13,7 +13,7 @@ fn proper(field: &Field, soil: Option<f64>, tolerance: f64) {
         }
     }
     for &absorbed in &field.absorbed_W_m2 {
-        assert!(absorbed >= 0.0 && absorbed <= field.incoming_W_m2);
+        assert!(absorbed >= 0.0 && absorbed <= (1.0 + tolerance) * field.incoming_W_m2);
     }
     close(closure(field, soil), 0.0, tolerance);
 }
@@ -34,7 +34,7 @@ fn any_depth_with_and_without_absorption() {
                     let layers = spherical(n, area_index, 4);
                     let leaf = LeafOptics::symmetric(rho, tau);
                     let field = solve(&layers, leaf, &sources, soil, bins);
-                    proper(&field, soil, 3e-13);
+                    proper(&field, soil, 3e-14);
                 }
             }
         }
@@ -42,17 +42,19 @@ fn any_depth_with_and_without_absorption() {
 }
 
 /// Over black soil the light that gets through a conservative canopy falls as 1 / depth, which is
-/// what rounding would spoil first.
+/// what rounding would spoil first. The problem's own condition is the depth: a difference of one
+/// part in 1e16 between what leaves send up and down is a drift that adds up.
 #[test]
 fn a_very_deep_conservative_canopy_still_passes_the_right_trace() {
     for rho in [0.5, 0.9] {
-        for area_index in [1e4, 1e9, 1e15] {
+        for area_index in [1e4, 1e6, 1e9] {
             let leaf = LeafOptics::symmetric(rho, 1.0 - rho);
             for (n, bins) in [(1, 1), (1, 6), (10, 6)] {
                 let layers = homogeneous(n, &[(1.0, false, area_index)]);
                 let field = solve(&layers, leaf, &[source(0.5, 1.0)], Some(0.0), bins);
                 let passed = 1.0 / (1.0 + rho * area_index);
-                close(field.transmitted_W_m2 / passed, 1.0, 1e-10);
+                let tolerance = 1e-15 * area_index;
+                close(field.transmitted_W_m2 / passed, 1.0, tolerance);
             }
         }
     }
