@@ -40,13 +40,16 @@ pub struct Foliage {
 /// Why a scene has no layers.
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum LayersFault {
-    /// Area per m² of ground is not defined.
+    /// Area per m² of ground is not defined, or beyond all bounds.
     #[error(
         "a scene without a pattern needs an extent in both x and y for a far field; \
          give it a pattern or use an infinite sphere diameter"
     )]
     NoGround,
 }
+
+/// Beyond this, ground is as good as none: a leaf of 1 m² that stands on 1e-20 m².
+const MAX_AREA_INDEX: f64 = 1e20;
 
 impl Layers {
     /// Cuts the scene into `n_layers` layers. Triangles are cut exactly where they cross a level.
@@ -79,13 +82,17 @@ impl Layers {
             sorter.add(&grid, triangle, material);
         }
         let (class_cosine, foliage) = sorter.finish(ground_area_m2);
-        Ok(Self {
+        let layers = Self {
             bottom_z_m: grid.bottom,
             top_z_m: grid.top,
             ground_area_m2,
             class_cosine,
             foliage,
-        })
+        };
+        if layers.area_index() > MAX_AREA_INDEX {
+            return Err(LayersFault::NoGround);
+        }
+        Ok(layers)
     }
 
     /// One-sided area of all layers, m² per m² of ground.

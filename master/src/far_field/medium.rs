@@ -5,7 +5,7 @@ use nestrad_common::optics::Band;
 
 use super::layers::{Foliage, Layers};
 use super::leaf::{self, Bins, LeafAngle};
-use super::matrix::Matrix;
+use super::matrix::{Matrix, sum};
 
 /// The parallel sources of a band, those of equal height in one.
 pub(super) struct Beams {
@@ -125,9 +125,6 @@ impl<'a> Medium<'a> {
             let onto = Onto(&angle.onto_sky_face, &angle.onto_ground_face);
             leaves.scatter(angle, onto, &mut interaction);
             add(&mut absorption, &leaves.absorbed(onto));
-            for (ch, extinction) in leaves.met(onto).into_iter().enumerate() {
-                interaction.row_mut(ch)[ch] -= extinction;
-            }
             let onto = Onto(
                 &self.beam_onto_sky_face[class],
                 &self.beam_onto_ground_face[class],
@@ -136,23 +133,38 @@ impl<'a> Medium<'a> {
             add(&mut beam_absorption, &leaves.absorbed(onto));
             add(&mut intercepted, &leaves.met(onto));
         }
+        // A channel loses what goes to the others and what is absorbed. Extinction less what comes
+        // back into the same channel is the same, but loses energy to rounding where it cancels.
+        for ch in 0..channels {
+            interaction.row_mut(ch)[ch] = 0.0;
+        }
+        let lost = sum(&interaction.column_sums(), &absorption);
+        for (ch, lost) in lost.into_iter().enumerate() {
+            interaction.row_mut(ch)[ch] = -lost;
+        }
         // Vertical leaves under a vertical beam meet nothing of it.
-        let share = |part: f64, met: f64| {
+        let inverse = |&met: &f64| {
             if met >= f64::MIN_POSITIVE {
-                part / met
+                1.0 / met
             } else {
                 0.0
             }
         };
-        let per_met: Vec<f64> = intercepted.iter().map(|&met| share(1.0, met)).collect();
+        let per_met: Vec<f64> = intercepted.iter().map(inverse).collect();
         beam_scatter.scale_columns(&per_met);
-        let depth = |met: f64, mu: f64| if met > 0.0 { met / mu } else { 0.0 };
+        let depth = |met, mu| {
+            if met >= f64::MIN_POSITIVE {
+                met / mu
+            } else {
+                0.0
+            }
+        };
         any.then(|| LayerOptics {
             interaction,
             absorption,
             beam_depth: zip_map(&intercepted, &self.beams.mu, depth),
             beam_scatter,
-            beam_absorption: zip_map(&beam_absorption, &intercepted, share),
+            beam_absorption: zip_map(&beam_absorption, &per_met, |a, per_met| a * per_met),
         })
     }
 

@@ -4,7 +4,7 @@
 //! because beams come from there. Levels and layers count from the ground.
 
 use super::leaf::Bins;
-use super::matrix::{Lu, Matrix, dot, sum};
+use super::matrix::{LEAST_LOSS, Lu, Matrix, dot, sum};
 use super::slab::Slab;
 
 /// Everything above a level, as seen from below.
@@ -129,7 +129,7 @@ pub(super) fn sweep(
     let shape: Vec<f64> = (0..bins.0).map(|b| bins.lambertian(b)).collect();
     let lost = 1.0 - albedo + albedo * dot(&shape, &above.lost);
     let arriving = beams_at_ground + above.emit.iter().sum::<f64>();
-    let power = albedo * arriving / lost.max(f64::MIN_POSITIVE);
+    let power = albedo * arriving / lost.max(LEAST_LOSS);
     let up: Vec<f64> = shape.iter().map(|share| power * share).collect();
     let mut fluxes = Fluxes {
         down: vec![above.down(&up)],

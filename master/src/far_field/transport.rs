@@ -104,7 +104,7 @@ fn field(bins: Bins, fluxes: Fluxes, incoming_W_m2: f64) -> Field {
         levels
             .iter()
             .flat_map(|level| level.iter().enumerate().map(of_bin))
-            .map(|x| x.max(0.0))
+            .map(|x| if x < 0.0 { 0.0 } else { x })
             .collect()
     };
     Field {

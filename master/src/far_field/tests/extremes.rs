@@ -1,5 +1,7 @@
 //! Parameters driven to their ends.
 
+use nestrad_common::optics::FaceOptics;
+
 use super::*;
 
 fn proper(field: &Field, soil: Option<f64>, tolerance: f64) {
@@ -20,8 +22,13 @@ fn proper(field: &Field, soil: Option<f64>, tolerance: f64) {
 
 #[test]
 fn any_depth_with_and_without_absorption() {
-    let sources = [source(1e-9, 0.1), source(0.01, 1.0), source(1.0, 1.0)];
-    for area_index in [0.0, 1e-300, 1e-12, 1.0, 1e4, 1e8, 1e15, 1e100] {
+    let sources = [
+        source(0.0, 0.1),
+        source(1e-9, 0.1),
+        source(0.01, 1.0),
+        source(1.0, 1.0),
+    ];
+    for area_index in [0.0, 1e-320, 1e-300, 1e-12, 1.0, 1e4, 1e8, 1e15, 1e100] {
         for (rho, tau) in [
             (0.0, 0.0),
             (0.5, 0.5),
@@ -147,4 +154,27 @@ fn no_light_no_leaves_and_no_bin_is_special() {
         6,
     );
     close(field.transmitted_W_m2, 1.0, 0.0);
+}
+
+/// Leaves that transmit better one way than the other: light gathers between two such layers, by a
+/// factor that grows exponentially with their depth.
+#[test]
+fn light_valves_balance_until_the_light_cannot_leave_at_all() {
+    let face = |rho, tau| FaceOptics { rho, tau };
+    let valve = LeafOptics {
+        upper: face(0.25, 0.75),
+        lower: face(0.0, 1.0),
+    };
+    for (area_index, closes) in [(20.0, true), (400.0, true), (6e4, false)] {
+        let mut layers = homogeneous(2, &[(1.0, false, area_index)]);
+        layers.foliage[1][0].lower_face_up = true;
+        let field = solve(&layers, valve, &[source(1.0, 1.0)], Some(0.5), 4);
+        for bin in 0..4 {
+            assert!(field.radiance_up(1, bin).is_finite());
+        }
+        assert!(field.reflected_W_m2.is_finite() && field.transmitted_W_m2.is_finite());
+        if closes {
+            close(closure(&field, Some(0.5)), 0.0, 1e-11);
+        }
+    }
 }

@@ -2,6 +2,7 @@
 
 mod closed_forms;
 mod extremes;
+mod figures;
 mod monte_carlo;
 mod properties;
 mod scene;
