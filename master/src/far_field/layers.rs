@@ -33,7 +33,7 @@ pub struct Foliage {
     pub material: u32,
     /// The right-hand normal points down: it is the lower face that looks up.
     pub lower_face_up: bool,
-    /// One-sided area, m² per m² of ground, `>= 0`.
+    /// One-sided area, m² per m² of ground, 0 to about 1e100.
     pub area_index: f64,
 }
 

@@ -4,6 +4,7 @@
 //! between them, per level and polar bin. Equations, proofs and measured figures are in
 //! `master/docs/far_field.md`.
 
+mod beam;
 pub mod layers;
 mod leaf;
 mod matrix;
