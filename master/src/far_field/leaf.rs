@@ -8,7 +8,7 @@ use std::f64::consts::{FRAC_1_PI, FRAC_2_PI};
 
 /// Projection function `G(mu)`: mean over leaf azimuth of `|cos(light, normal)|`.
 ///
-/// Between 0 and 1. Ross 1981; Shultis & Myneni 1988, eq. 6, rewritten without divisions:
+/// Between 0 and 1. Ross 1981; Shultis & Myneni 1988; rewritten without divisions:
 /// `mu c` where the light never grazes the leaf (`mu >= sqrt(1 - c^2)`), else
 /// `2/pi [mu c atan(mu c / w) + w]` with `w = sqrt(1 - c^2 - mu^2)`.
 pub(super) fn projection(mu: f64, c: f64) -> f64 {

@@ -167,7 +167,7 @@ pub(super) const LEAST_LOSS: f64 = 1e-100;
 /// LU factors of a column diagonally dominant matrix, found without exchanging pivots.
 ///
 /// Elimination keeps such a matrix diagonally dominant and its entries grow at most twofold, so it
-/// is backward stable (Higham 2002, theorem 9.9).
+/// is backward stable (Higham 2002, section 9.5).
 pub(super) struct Lu {
     /// Unit lower triangle and upper triangle in one; the diagonal holds the pivots' reciprocals.
     factors: Matrix,

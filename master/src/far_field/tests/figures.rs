@@ -108,3 +108,21 @@ fn number_of_layers() {
         println!("| {n} | {r:.1e} | {t:.1e} | {l:.1e} |");
     }
 }
+
+#[test]
+#[ignore = "prints figures"]
+fn trace_through_depth() {
+    println!("light that passes a conservative canopy of horizontal leaves: relative error");
+    for rho in [0.5, 0.9] {
+        for area_index in [1e4, 1e6, 1e9, 1e15] {
+            print!("| {rho} | {area_index:e} |");
+            for (n, bins) in [(1, 1), (1, 6), (10, 6)] {
+                let layers = homogeneous(n, &[(1.0, false, area_index)]);
+                let field = solve(&layers, leaf(rho, 1.0 - rho), &sky(), Some(0.0), bins);
+                let passed = field.incoming_W_m2 / (1.0 + rho * area_index);
+                print!(" {:.1e} |", field.transmitted_W_m2 / passed - 1.0);
+            }
+            println!();
+        }
+    }
+}
