@@ -8,6 +8,7 @@
 
 pub mod direct;
 pub mod exchange;
+pub mod far_field;
 pub mod output;
 pub mod results;
 pub mod solution;

@@ -83,7 +83,8 @@ pub fn parse(file: &str, bytes: &[u8]) -> Result<Opt, FormatError> {
 
 fn species(fields: &mut Fields<'_>) -> Result<Species, FormatError> {
     fields.keyword("d")?;
-    let stem = opaque(fields, "rho of the stem")?;
+    let stem = LeafOptics::solid(fields.number("rho of the stem")?);
+    checked(fields, stem)?;
     let leaf = LeafOptics {
         upper: face(fields, "upper")?,
         lower: face(fields, "lower")?,
