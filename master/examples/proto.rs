@@ -34,7 +34,13 @@ fn main() {
         mark = (Instant::now(), cpu());
     };
     let start = cpu();
-    let world = world::World::new(&p.scene, 0.05, 0.05, get("--radius", f64::INFINITY), (0, 0));
+    let world = world::World::new(
+        &p.scene,
+        get("--edge", 0.05),
+        0.05,
+        get("--radius", f64::INFINITY),
+        (0, 0),
+    );
     lap("world");
     let areas = direct::spread_effort(p, get("--sun", 0.0024f64).powi(2));
     let d = direct::direct_light(p, &world, &areas, seed);
@@ -71,6 +77,7 @@ fn main() {
         p,
         &world,
         &ex,
+        &outlook,
         &d.irradiance_W_m2,
         &fixed,
         &scattering,

@@ -106,4 +106,4 @@ pub fn spread_effort(problem: &Problem, finest_m2: f64) -> Vec<f64> {
 }
 
 /// No source is drawn with lines coarser than this many times those of the strongest.
-const COARSEST: f64 = 64.0;
+const COARSEST: f64 = 4.0;

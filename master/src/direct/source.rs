@@ -23,10 +23,26 @@ pub(super) struct Scratch {
     visible: Vec<u32>,
     /// Points that meet each element.
     met: Vec<u32>,
-    /// Per organ: points that show it, points that meet it.
-    organ: Vec<[u64; 2]>,
-    /// Per organ: light by the elements' visible parts, W for unit irradiance.
-    dealt: Vec<f64>,
+    organ: Vec<OfOrgan>,
+    lit: Vec<Lit>,
+}
+
+/// What an organ shows to the source.
+#[derive(Clone, Copy, Default)]
+struct OfOrgan {
+    /// By its points.
+    seen_m2: f64,
+    /// By what its elements got.
+    dealt_m2: f64,
+}
+
+/// An element that is lit.
+struct Lit {
+    element: usize,
+    upper: bool,
+    /// Perpendicular to the source.
+    area_m2: f64,
+    variance_m4: f64,
 }
 
 impl Scratch {
@@ -35,16 +51,15 @@ impl Scratch {
             buffer: Buffer::default(),
             visible: vec![0; world.rows()],
             met: vec![0; world.elements.len()],
-            organ: vec![[0; 2]; organs],
-            dealt: vec![0.0; organs],
+            organ: vec![OfOrgan::default(); organs],
+            lit: Vec::new(),
         }
     }
 
     fn clear(&mut self) {
         self.visible.fill(0);
         self.met.fill(0);
-        self.organ.fill([0; 2]);
-        self.dealt.fill(0.0);
+        self.organ.fill(OfOrgan::default());
     }
 }
 
@@ -118,7 +133,6 @@ pub(super) fn add(
         },
     );
 
-    deal_out(problem, world, towards, scratch);
     direct.lines += lattice.lines() as u64;
     for (b, i) in intensity.iter().enumerate() {
         let all = lattice.lines() as u64 - if world.extent.periodic { 0 } else { missed };
@@ -127,42 +141,102 @@ pub(super) fn add(
             direct.passed_W[b] += i * lattice.line_area_m2 * missed as f64;
         }
     }
-    for e in 0..world.elements.len() {
-        let t = world.triangle_of_element[e] as usize;
-        let area = world.elements.area_m2[e];
-        let o = scene.organ[t] as usize;
-        if scratch.dealt[o] <= 0.0 || area <= 0.0 {
-            continue;
-        }
-        let projected = projected_area(&scene.triangles[t], world.elements.divisions[t], towards);
-        let scale = scratch.organ[o][0] as f64 * lattice.line_area_m2 / scratch.dealt[o];
-        let (met, lit) = seen_part(scratch, e, o);
-        let face = if projected > 0.0 { 2 * e } else { 2 * e + 1 };
-        let optics = scene.material[t] as usize;
-        for (b, i) in intensity.iter().enumerate() {
-            direct.irradiance_W_m2[face * bands + b] += i * scale * projected.abs() * lit / area;
-            let absorbed =
-                i * projected.abs() * absorptance(&problem.bands[b], optics, face % 2 == 0);
-            // binomial, for the points that meet it
-            direct.element_variance_W2[e * bands + b] +=
-                absorbed * absorbed * lit * (1.0 - lit) / met.max(1.0);
-        }
-    }
+    deal_out(
+        problem,
+        world,
+        towards,
+        lattice.line_area_m2,
+        &intensity,
+        scratch,
+        direct,
+    );
     if let Some(soil) = &world.soil {
         for cell in 0..soil.cells() {
             let row = world.ends.soil(cell) as usize;
-            let points = f64::from(scratch.visible[row]);
+            let lit_m2 = f64::from(scratch.visible[row]) * lattice.line_area_m2;
             for (b, i) in intensity.iter().enumerate() {
-                direct.irradiance_W_m2[row * bands + b] +=
-                    i * points * lattice.line_area_m2 / soil.cell_area_m2();
+                direct.irradiance_W_m2[row * bands + b] += i * lit_m2 / soil.cell_area_m2();
             }
         }
     }
 }
 
-/// Projected area of an element, m²; negative when the lower face looks towards the source.
-fn projected_area(triangle: &[DVec3; 3], divisions: u32, towards: DVec3) -> f64 {
-    0.5 * geometry::doubled_area_vector(triangle).dot(towards) / f64::from(divisions * divisions)
+/// Points that a large element is met by, on average.
+const LARGE: f64 = 4.0;
+
+/// Deals the light of each organ out to its elements.
+///
+/// A large element is lit by its projected area times the part of its points that see the source, a
+/// small one by the area of the points that see it. Which of the two depends on its size alone, so both
+/// are unbiased. What all of an organ's elements get is then scaled to what the organ gets.
+fn deal_out(
+    problem: &Problem,
+    world: &World,
+    towards: DVec3,
+    line_area_m2: f64,
+    intensity: &[f64],
+    scratch: &mut Scratch,
+    direct: &mut Direct,
+) {
+    let (scene, bands) = (&problem.scene, problem.bands.len());
+    let organ_of = |t: u32| scene.organ[t as usize] as usize;
+    scratch.lit.clear();
+    for (e, &t) in world.triangle_of_element.iter().enumerate() {
+        let seen = f64::from(scratch.visible[2 * e] + scratch.visible[2 * e + 1]);
+        if seen == 0.0 {
+            continue;
+        }
+        let met = f64::from(scratch.met[e]);
+        let projected_m2 = projected_area_m2(world, &scene.triangles, e, towards);
+        let (area_m2, variance_m4) = if projected_m2.abs() > LARGE * line_area_m2 {
+            let part = seen / met;
+            // binomial, for the points that meet it
+            (
+                projected_m2.abs() * part,
+                projected_m2 * projected_m2 * part * (1.0 - part) / met,
+            )
+        } else {
+            (seen * line_area_m2, seen * line_area_m2 * line_area_m2)
+        };
+        let organ = &mut scratch.organ[organ_of(t)];
+        organ.seen_m2 += seen * line_area_m2;
+        organ.dealt_m2 += area_m2;
+        scratch.lit.push(Lit {
+            element: e,
+            upper: projected_m2 > 0.0,
+            area_m2,
+            variance_m4,
+        });
+    }
+    for lit in &scratch.lit {
+        let t = world.triangle_of_element[lit.element];
+        let organ = &scratch.organ[organ_of(t)];
+        let row = 2 * lit.element + usize::from(!lit.upper);
+        let irradiated =
+            lit.area_m2 * organ.seen_m2 / organ.dealt_m2 / world.elements.area_m2[lit.element];
+        for (b, i) in intensity.iter().enumerate() {
+            direct.irradiance_W_m2[row * bands + b] += i * irradiated;
+            let absorbed = i * absorptance(
+                &problem.bands[b],
+                scene.material[t as usize] as usize,
+                lit.upper,
+            );
+            direct.element_variance_W2[lit.element * bands + b] +=
+                absorbed * absorbed * lit.variance_m4;
+        }
+    }
+}
+
+/// Projected area of an element; negative when the lower face looks towards the source.
+fn projected_area_m2(
+    world: &World,
+    triangles: &[[DVec3; 3]],
+    element: usize,
+    towards: DVec3,
+) -> f64 {
+    let t = world.triangle_of_element[element] as usize;
+    let n = world.elements.divisions[t];
+    0.5 * geometry::doubled_area_vector(&triangles[t]).dot(towards) / f64::from(n * n)
 }
 
 fn absorptance(band: &Band, material: usize, upper: bool) -> f64 {
@@ -171,38 +245,6 @@ fn absorptance(band: &Band, material: usize, upper: bool) -> f64 {
         optics.upper.absorptance()
     } else {
         optics.lower.absorptance()
-    }
-}
-
-/// How many points meet an element, and the part of them that see it. An element that no point meets
-/// is taken to be seen as its organ is.
-fn seen_part(scratch: &Scratch, element: usize, organ: usize) -> (f64, f64) {
-    let met = scratch.met[element];
-    let seen = scratch.visible[2 * element] + scratch.visible[2 * element + 1];
-    let [organ_seen, organ_met] = scratch.organ[organ];
-    if met > 0 {
-        (f64::from(met), f64::from(seen) / f64::from(met))
-    } else if organ_met > 0 {
-        (0.0, organ_seen as f64 / organ_met as f64)
-    } else {
-        (0.0, 0.0)
-    }
-}
-
-/// Sums per organ what its elements show.
-fn deal_out(problem: &Problem, world: &World, towards: DVec3, scratch: &mut Scratch) {
-    let scene = &problem.scene;
-    for e in 0..world.elements.len() {
-        let o = scene.organ[world.triangle_of_element[e] as usize] as usize;
-        scratch.organ[o][0] += u64::from(scratch.visible[2 * e] + scratch.visible[2 * e + 1]);
-        scratch.organ[o][1] += u64::from(scratch.met[e]);
-    }
-    for e in 0..world.elements.len() {
-        let t = world.triangle_of_element[e] as usize;
-        let o = scene.organ[t] as usize;
-        let (_, lit) = seen_part(scratch, e, o);
-        scratch.dealt[o] +=
-            lit * projected_area(&scene.triangles[t], world.elements.divisions[t], towards).abs();
     }
 }
 
