@@ -6,11 +6,13 @@
 //! world: whichever part of a scene is drawn, the same line meets the same triangles.
 
 mod scan;
+mod soup;
 mod strips;
 
 use glam::{DVec2, DVec3};
 
 pub use scan::{Fragment, Projected};
+pub use soup::Soup;
 pub use strips::Strips;
 
 /// Where lines may run: what fixes a lattice to the world.
@@ -129,13 +131,13 @@ impl Lattice {
     }
 
     #[inline]
-    fn u(&self, p: DVec3) -> f64 {
-        snap((p.x - p.z * self.shear.x) * self.steps_per_m.x + self.offset.x)
+    fn u(&self, x: f64, z: f64) -> f64 {
+        snap((x - z * self.shear.x) * self.steps_per_m.x + self.offset.x)
     }
 
     #[inline]
-    fn v(&self, p: DVec3) -> f64 {
-        snap((p.y - p.z * self.shear.y) * self.steps_per_m.y + self.offset.y)
+    fn v(&self, y: f64, z: f64) -> f64 {
+        snap((y - z * self.shear.y) * self.steps_per_m.y + self.offset.y)
     }
 
     #[inline]
