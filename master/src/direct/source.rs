@@ -101,7 +101,7 @@ pub(super) fn add(
     } = scratch;
     buffer.draw(
         &lattice,
-        &scene.triangles,
+        &world.soup,
         &world.elements,
         world.soil.map(|s| s.z_m),
         |element| met[element as usize] += 1,

@@ -26,12 +26,12 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced
         rays,
         batch: batch.index,
     };
-    let tasks = block.triangles.len().div_ceil(TASK);
+    let tasks = block.soup.triangles().len().div_ceil(TASK);
     let looks: Vec<Vec<Pair>> = (0..tasks)
         .into_par_iter()
         .map(|task| {
             let mut looks = Vec::new();
-            for t in task * TASK..((task + 1) * TASK).min(block.triangles.len()) {
+            for t in task * TASK..((task + 1) * TASK).min(block.soup.triangles().len()) {
                 from_triangle(block, tracer, &plan, t, &mut looks);
             }
             looks
@@ -59,7 +59,7 @@ impl Plan<'_> {
 }
 
 fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &mut Vec<Pair>) {
-    let triangle = &block.triangles[t];
+    let triangle = &block.soup.triangles()[t];
     let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
     let Some(normal) = normal.try_normalize() else {
         return;
@@ -68,8 +68,8 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
     for local in block.first[t]..block.first[t + 1] {
         for side in 0..2 {
             let face = 2 * local + side;
-            let global = block.global(face);
-            if block.row_of(face).is_none() {
+            let global = block.seen_as[face as usize];
+            if !block.has_row(face) {
                 continue;
             }
             let count = plan.rays_of(block.area_m2[local as usize], global);

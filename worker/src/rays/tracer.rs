@@ -46,7 +46,7 @@ impl Tracer {
     pub fn new(block: &Block) -> Self {
         let extent = &block.extent;
         let (mut lo, mut hi) =
-            geometry::bounds(block.triangles.iter().flatten()).unwrap_or_default();
+            geometry::bounds(block.soup.triangles().iter().flatten()).unwrap_or_default();
         let (z_min_m, z_max_m) = (lo.z, hi.z);
         if extent.periodic {
             (lo.x, lo.y, hi.x, hi.y) = (
@@ -61,9 +61,9 @@ impl Tracer {
         // f32 rounding of a box and of a ray's origin, and the nodes that obvhs takes as passed
         let padding = HALF_EXTENT * f64::from(f32::EPSILON) * 4.0 + 2.0 * NEAREST_NODE;
 
-        let mut primitives = Vec::with_capacity(block.triangles.len());
-        let mut boxes = Vec::with_capacity(block.triangles.len());
-        for (t, triangle) in block.triangles.iter().enumerate() {
+        let mut primitives = Vec::with_capacity(block.soup.triangles().len());
+        let mut boxes = Vec::with_capacity(block.soup.triangles().len());
+        for (t, triangle) in block.soup.triangles().iter().enumerate() {
             let Some((a, b)) = geometry::bounds(triangle) else {
                 continue;
             };
@@ -175,7 +175,7 @@ impl Tracer {
                     return f32::INFINITY;
                 }
                 let Some(hit) = edges.meet(
-                    &block.triangles[t as usize],
+                    &block.soup.triangles()[t as usize],
                     ray.origin - block.shift_m(away),
                 ) else {
                     return f32::INFINITY;
