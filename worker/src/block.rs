@@ -7,9 +7,6 @@ use nestrad_common::lattice::Extent;
 use nestrad_proto::v1;
 use thiserror::Error;
 
-/// No row is wanted for this end.
-pub(crate) const NO_ROW: u32 = u32::MAX;
-
 /// Geometry of a job.
 ///
 /// Inside a block, faces are numbered by their place in the block ("local ends"): the two faces of
@@ -25,11 +22,13 @@ pub struct Block {
     /// First local element of each triangle, and their number at the end.
     pub(crate) first: Vec<u32>,
     pub(crate) divisions: Vec<u32>,
-    /// What each local face is seen as: its number in the scene.
+    /// Faces of local elements; local ends from here on are not faces.
+    pub(crate) local_faces: u32,
+    /// What each local end is seen as: its number in the scene.
     pub(crate) seen_as: Vec<u32>,
     /// One-sided area of each local element, m².
     pub(crate) area_m2: Vec<f64>,
-    /// Row of each local face and of each soil cell, or [`NO_ROW`].
+    /// Row of each local end; [`Self::rows`] for an end that has none here.
     pub(crate) row: Vec<u32>,
     /// Number of rows.
     pub(crate) rows: usize,
@@ -131,12 +130,16 @@ impl Block {
             }
         }
         first.push(area_m2.len() as u32);
-        let cells_at = row.len();
-        row.resize(cells_at + soil_cells as usize, NO_ROW);
+        let local_faces = row.len() as u32;
+        seen_as.extend(ends.faces()..ends.len() as u32);
+        row.resize(seen_as.len(), NO_ROW);
         for &cell in &block.owned_soil_cells {
             require(cell < soil_cells, "owned_soil_cells")?;
-            row[cells_at + cell as usize] = rows;
+            row[(local_faces + cell) as usize] = rows;
             rows += 1;
+        }
+        for r in &mut row {
+            *r = (*r).min(rows);
         }
         Ok(Self {
             extent: Extent {
@@ -150,6 +153,7 @@ impl Block {
             triangles,
             first,
             divisions: block.divisions.clone(),
+            local_faces,
             seen_as,
             area_m2,
             row,
@@ -157,22 +161,9 @@ impl Block {
         })
     }
 
-    /// Faces of local elements; local ends from here on are not faces.
-    pub(crate) fn local_faces(&self) -> u32 {
-        self.seen_as.len() as u32
-    }
-
     /// The local number of an end that is not a face.
     pub(crate) fn local(&self, end: u32) -> u32 {
-        end - self.ends.faces() + self.local_faces()
-    }
-
-    /// The number in the scene of a local end.
-    pub(crate) fn global(&self, local: u32) -> u32 {
-        match self.seen_as.get(local as usize) {
-            Some(&end) => end,
-            None => local - self.local_faces() + self.ends.faces(),
-        }
+        end - self.ends.faces() + self.local_faces
     }
 
     /// How far away a copy of the scene lies, metres.
@@ -181,14 +172,14 @@ impl Block {
         DVec3::new(copy[0] as f64 * size.x, copy[1] as f64 * size.y, 0.0)
     }
 
-    /// The row of a local end, if it has one here.
-    pub(crate) fn row_of(&self, local: u32) -> Option<usize> {
-        self.row
-            .get(local as usize)
-            .filter(|&&r| r != NO_ROW)
-            .map(|&r| r as usize)
+    /// Whether rows of a local end are wanted.
+    pub(crate) fn has_row(&self, local: u32) -> bool {
+        (self.row[local as usize] as usize) < self.rows
     }
 }
+
+/// Stands for the place past the rows until their number is known.
+const NO_ROW: u32 = u32::MAX;
 
 fn vector(v: Option<&v1::Vector>, name: &'static str) -> Result<DVec3, BlockFault> {
     let v = v.ok_or(BlockFault::Missing(name))?;

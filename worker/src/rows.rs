@@ -20,32 +20,26 @@ pub(crate) struct Traced {
 
 /// Sorts pairs into rows, stably: by counting, so the cost is linear.
 pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
-    let mut lengths = vec![0u32; block.rows];
-    let mut count = |local: u32| {
-        if let Some(row) = block.row_of(local) {
-            lengths[row] += 1;
-        }
-    };
+    // what has no row is counted past the last one, so that counting needs no branch
+    let row = |local: u32| block.row[local as usize] as usize;
+    let mut next = vec![0u32; block.rows + 1];
     for &(a, b) in traced.pairs.iter().flatten() {
-        count(a);
-        count(b);
+        next[row(a)] += 1;
+        next[row(b)] += 1;
     }
     for &(a, _) in &traced.looks {
-        count(a);
+        next[row(a)] += 1;
     }
-
-    let mut next = Vec::with_capacity(block.rows);
-    let mut total = 0usize;
-    for &length in &lengths {
-        next.push(total);
-        total += length as usize;
+    let lengths = next[..block.rows].to_vec();
+    let mut total = 0;
+    for place in &mut next {
+        total += std::mem::replace(place, total);
     }
-    let mut ends = vec![0u32; total];
+    let mut ends = vec![0u32; total as usize];
     let mut put = |from: u32, seen: u32| {
-        if let Some(row) = block.row_of(from) {
-            ends[next[row]] = block.global(seen);
-            next[row] += 1;
-        }
+        let place = &mut next[row(from)];
+        ends[*place as usize] = block.seen_as[seen as usize];
+        *place += 1;
     };
     for &(a, b) in traced.pairs.iter().flatten() {
         put(a, b);
@@ -54,6 +48,7 @@ pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
     for &(a, b) in &traced.looks {
         put(a, b);
     }
+    ends.truncate(lengths.iter().map(|&l| l as usize).sum());
     v1::Rows {
         lengths,
         ends,

@@ -48,9 +48,15 @@ pub struct Lattice {
     s_steps_per_m: f64,
 }
 
-/// Vertices are rounded to this part of a lattice step, so that copies of a vertex one pattern
-/// apart stay exactly one pattern apart.
-const SUBSTEPS: f64 = (1u64 << 20) as f64;
+/// Rounds a lattice coordinate to 2^-20 of a step, so that copies of a vertex one pattern apart stay
+/// exactly one pattern apart.
+///
+/// Adding and taking away 1.5 * 2^(52 - 20) leaves no bits below 2^-20, for coordinates up to 2^31.
+#[inline]
+fn snap(x: f64) -> f64 {
+    const ROUNDER: f64 = 1.5 * (1u64 << 32) as f64;
+    (x + ROUNDER) - ROUNDER
+}
 
 /// Largest number of steps along one side; keeps every coordinate exact in f64.
 const MAX_SIDE: f64 = (1u64 << 24) as f64;
@@ -110,10 +116,7 @@ impl Lattice {
 
     /// Lattice coordinates of a point, before rounding.
     pub fn place(&self, p: DVec3) -> DVec2 {
-        DVec2::new(
-            (p.x - p.z * self.shear.x) * self.steps_per_m.x + self.offset.x,
-            (p.y - p.z * self.shear.y) * self.steps_per_m.y + self.offset.y,
-        )
+        (p.truncate() - p.z * self.shear) * self.steps_per_m + self.offset
     }
 
     /// The point at height `z_m` on the line through lattice point `(i, j)`.
@@ -125,13 +128,19 @@ impl Lattice {
         )
     }
 
-    fn snapped(&self, p: DVec3) -> [f64; 3] {
-        let uv = self.place(p) * SUBSTEPS;
-        [
-            uv.x.round_ties_even() / SUBSTEPS,
-            uv.y.round_ties_even() / SUBSTEPS,
-            p.z / self.direction.z,
-        ]
+    #[inline]
+    fn u(&self, p: DVec3) -> f64 {
+        snap((p.x - p.z * self.shear.x) * self.steps_per_m.x + self.offset.x)
+    }
+
+    #[inline]
+    fn v(&self, p: DVec3) -> f64 {
+        snap((p.y - p.z * self.shear.y) * self.steps_per_m.y + self.offset.y)
+    }
+
+    #[inline]
+    fn s_m(&self, p: DVec3) -> f64 {
+        p.z / self.direction.z
     }
 
     /// Distance along the line as a whole number that sorts like it; see [`Self::distance_m`].

@@ -35,14 +35,24 @@ pub struct Projected {
 
 impl Projected {
     /// Projects a triangle; `None` when no line can meet it.
+    ///
+    /// Most triangles of a canopy slip between the lines, so that is found out first.
     #[inline]
     pub fn new(lattice: &Lattice, triangle: &[DVec3; 3]) -> Option<Self> {
-        if lattice.nx == 0 {
+        let v = triangle.map(|p| lattice.v(p));
+        let (first_row, end_row) = (
+            above(v[0].min(v[1]).min(v[2])),
+            above(v[0].max(v[1]).max(v[2])),
+        );
+        if first_row >= end_row {
             return None;
         }
-        let raw = triangle.map(|p| lattice.snapped(p));
+        let u = triangle.map(|p| lattice.u(p));
+        if above(u[0].min(u[1]).min(u[2])) >= above(u[0].max(u[1]).max(u[2])) {
+            return None;
+        }
         let mut vertex = [0usize, 1, 2];
-        let below = |a: usize, b: usize| (raw[a][1], raw[a][0]) <= (raw[b][1], raw[b][0]);
+        let below = |a: usize, b: usize| (v[a], u[a]) <= (v[b], u[b]);
         if !below(vertex[0], vertex[1]) {
             vertex.swap(0, 1);
         }
@@ -52,23 +62,9 @@ impl Projected {
                 vertex.swap(0, 1);
             }
         }
-        let corner = vertex.map(|v| raw[v]);
-        let (first_row, end_row) = (corner[0][1].ceil() as i64, corner[2][1].ceil() as i64);
-        if first_row >= end_row {
-            return None;
-        }
-        let (u_min, u_max) = raw
-            .iter()
-            .fold((f64::INFINITY, f64::NEG_INFINITY), |(lo, hi), c| {
-                (lo.min(c[0]), hi.max(c[0]))
-            });
-        if u_min.ceil() >= u_max.ceil() {
-            return None;
-        }
-        let turn = (raw[1][0] - raw[0][0]) * (raw[2][1] - raw[0][1])
-            - (raw[2][0] - raw[0][0]) * (raw[1][1] - raw[0][1]);
+        let turn = (u[1] - u[0]) * (v[2] - v[0]) - (u[2] - u[0]) * (v[1] - v[0]);
         Some(Self {
-            corner,
+            corner: vertex.map(|k| [u[k], v[k], lattice.s_m(triangle[k])]),
             vertex,
             upper_along: turn > 0.0,
             first_row,
@@ -111,7 +107,7 @@ impl Projected {
             }
         };
         let (rise_ab, rise_bc, rise_ac) = (rise(a, b), rise(b, c), rise(a, c));
-        let bend = b[1].ceil() as i64;
+        let bend = above(b[1]);
         let ny = i64::from(lattice.ny);
         let mut row = self.first_row.rem_euclid(ny);
         let wrap_row = lattice.periodic;
@@ -142,7 +138,7 @@ impl Projected {
             } else {
                 (short, long)
             };
-            let (i_first, i_end) = (left.ceil() as i64, right.ceil() as i64);
+            let (i_first, i_end) = (above(left), above(right));
             if i_first >= i_end {
                 continue;
             }
@@ -180,6 +176,14 @@ impl Projected {
             }
         }
     }
+}
+
+/// The least whole number that is not below `x`; `f64::ceil` is a call where the processor's rounding
+/// instruction cannot be assumed.
+#[inline]
+fn above(x: f64) -> i64 {
+    let truncated = x as i64;
+    truncated + i64::from(x > truncated as f64)
 }
 
 #[cfg(test)]

@@ -68,8 +68,8 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
     for local in block.first[t]..block.first[t + 1] {
         for side in 0..2 {
             let face = 2 * local + side;
-            let global = block.global(face);
-            if block.row_of(face).is_none() {
+            let global = block.seen_as[face as usize];
+            if !block.has_row(face) {
                 continue;
             }
             let count = plan.rays_of(block.area_m2[local as usize], global);
