@@ -90,7 +90,15 @@ fn main() {
     .unwrap();
     lap("solve");
     eprintln!("passes {} left {:?}", irr.passes, irr.left);
-    let sol = results::assemble(p, &world, &d, &outlook, &irr, &scattering);
+    let sol = results::Parts {
+        problem: p,
+        world: &world,
+        direct: &d,
+        outlook: &outlook,
+        irradiance: &irr,
+        scattering: &scattering,
+    }
+    .assemble();
     lap("results");
     eprintln!("total cpu {:.3}", cpu() - start);
     let reference =

@@ -8,7 +8,7 @@ use crate::exchange::{BlockOf, Exchange, ExchangeError, Outlook, Traced, trace_h
 use crate::output::progress::Progress;
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
-use crate::results;
+use crate::results::Parts;
 use crate::solution::Solution;
 use crate::solver::{self, Irradiance, SolveError};
 
@@ -87,14 +87,15 @@ pub fn solve(
         )?;
         watch.lap("solve");
     }
-    let solution = results::assemble(
+    let parts = Parts {
         problem,
-        &world,
-        &direct,
-        &outlook,
-        &irradiance,
-        &plan.scattering_bands,
-    );
+        world: &world,
+        direct: &direct,
+        outlook: &outlook,
+        irradiance: &irradiance,
+        scattering: &plan.scattering_bands,
+    };
+    let solution = parts.assemble();
     watch.lap("results");
     let counters = Counters {
         elements: world.elements.len(),

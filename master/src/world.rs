@@ -5,12 +5,14 @@ use glam::{DVec2, DVec3};
 use nestrad_common::elements::Elements;
 use nestrad_common::ends::Ends;
 use nestrad_common::geometry;
-use nestrad_common::lattice::Extent;
+use nestrad_common::lattice::{Extent, Soup};
 use nestrad_common::scene::{Material, Scene};
 
 /// What stays the same for all stages of a solve.
 #[derive(Clone, Debug)]
 pub struct World {
+    /// The triangles.
+    pub soup: Soup,
     /// How triangles are cut.
     pub elements: Elements,
     /// The triangle of each element.
@@ -118,6 +120,7 @@ impl World {
             far_bins: far.1,
         };
         Self {
+            soup: Soup::new(scene.triangles.clone()),
             // CAN's opaque organs (leaf 0) are the surfaces of solid stems
             solid: scene
                 .material

@@ -3,7 +3,7 @@
 use glam::{DVec2, DVec3};
 use nestrad_common::ends::Ends;
 use nestrad_common::geometry;
-use nestrad_common::lattice::Extent;
+use nestrad_common::lattice::{Extent, Soup};
 use nestrad_proto::v1;
 use thiserror::Error;
 
@@ -18,7 +18,7 @@ pub struct Block {
     pub(crate) ends: Ends,
     pub(crate) soil: Option<Soil>,
     pub(crate) radius_m: f64,
-    pub(crate) triangles: Vec<[DVec3; 3]>,
+    pub(crate) soup: Soup,
     /// First local element of each triangle, and their number at the end.
     pub(crate) first: Vec<u32>,
     pub(crate) divisions: Vec<u32>,
@@ -150,7 +150,7 @@ impl Block {
             ends,
             soil,
             radius_m: world.sphere_radius_m,
-            triangles,
+            soup: Soup::new(triangles),
             first,
             divisions: block.divisions.clone(),
             local_faces,

@@ -5,6 +5,8 @@
 //! evaluated from its lower to its upper vertex, so the two triangles that share it compute the
 //! very same crossing: together they cover each point once.
 
+use std::ops::Range;
+
 use glam::DVec3;
 
 use super::Lattice;
@@ -39,7 +41,7 @@ impl Projected {
     /// Most triangles of a canopy slip between the lines, so that is found out first.
     #[inline]
     pub fn new(lattice: &Lattice, triangle: &[DVec3; 3]) -> Option<Self> {
-        let v = triangle.map(|p| lattice.v(p));
+        let v = triangle.map(|p| lattice.v(p.y, p.z));
         let (first_row, end_row) = (
             above(v[0].min(v[1]).min(v[2])),
             above(v[0].max(v[1]).max(v[2])),
@@ -47,7 +49,7 @@ impl Projected {
         if first_row >= end_row {
             return None;
         }
-        let u = triangle.map(|p| lattice.u(p));
+        let u = triangle.map(|p| lattice.u(p.x, p.z));
         if above(u[0].min(u[1]).min(u[2])) >= above(u[0].max(u[1]).max(u[2])) {
             return None;
         }
@@ -73,7 +75,7 @@ impl Projected {
     }
 
     /// Unwrapped lattice rows that the triangle reaches.
-    pub fn rows(&self) -> std::ops::Range<i64> {
+    pub fn rows(&self) -> Range<i64> {
         self.first_row..self.end_row
     }
 
@@ -83,98 +85,139 @@ impl Projected {
     pub fn scan(
         &self,
         lattice: &Lattice,
-        rows: std::ops::Range<u32>,
+        rows: Range<u32>,
         with_place: bool,
         mut hit: impl FnMut(Fragment),
     ) {
         let [a, b, c] = self.corner;
-        // plane of depth, and of the barycentric coordinates, over the lattice
-        let (abu, abv, acu, acv) = (b[0] - a[0], b[1] - a[1], c[0] - a[0], c[1] - a[1]);
-        let inverse = 1.0 / (abu * acv - acu * abv);
-        if !inverse.is_finite() {
-            return;
-        }
-        let (abs, acs) = (b[2] - a[2], c[2] - a[2]);
-        let slope_u = (abs * acv - acs * abv) * inverse;
-        let slope_v = (acs * abu - abs * acu) * inverse;
-        let (s_lo, s_hi) = (a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2]));
-        // crossing of an edge with a row, always from its lower end
-        let rise = |p: [f64; 3], q: [f64; 3]| {
-            if q[1] > p[1] {
-                (q[0] - p[0]) / (q[1] - p[1])
-            } else {
-                0.0
-            }
-        };
-        let (rise_ab, rise_bc, rise_ac) = (rise(a, b), rise(b, c), rise(a, c));
         let bend = above(b[1]);
-        let ny = i64::from(lattice.ny);
-        let mut row = self.first_row.rem_euclid(ny);
-        let wrap_row = lattice.periodic;
-        for j in self.first_row..self.end_row {
-            let wrapped = if wrap_row {
-                if row == ny {
-                    row = 0;
-                }
-                row += 1;
-                row - 1
-            } else if (0..ny).contains(&j) {
-                j
-            } else {
-                continue;
-            } as u32;
-            if !rows.contains(&wrapped) {
+        // most triangles are met by no line or by one: nothing is computed before it is needed
+        let long = Edge::new(a, c);
+        let mut plane: Option<Plane> = None;
+        for (part, edge) in [(self.first_row..bend, (a, b)), (bend..self.end_row, (b, c))] {
+            if part.is_empty() {
                 continue;
             }
-            let v = j as f64;
-            let long = a[0] + (v - a[1]) * rise_ac;
-            let short = if j < bend {
-                a[0] + (v - a[1]) * rise_ab
-            } else {
-                b[0] + (v - b[1]) * rise_bc
-            };
-            let (left, right) = if long <= short {
-                (long, short)
-            } else {
-                (short, long)
-            };
-            let (i_first, i_end) = (above(left), above(right));
-            if i_first >= i_end {
-                continue;
-            }
-            let nx = i64::from(lattice.nx);
-            let row_start = wrapped as usize * lattice.nx as usize;
-            let mut i_wrapped = i_first.rem_euclid(nx);
-            for i in i_first..i_end {
-                let column = if lattice.periodic {
-                    if i_wrapped == nx {
-                        i_wrapped = 0;
-                    }
-                    i_wrapped += 1;
-                    i_wrapped - 1
-                } else if (0..nx).contains(&i) {
-                    i
-                } else {
+            let short = Edge::new(edge.0, edge.1);
+            for j in part {
+                let Some(row) = wrap(j, lattice.ny, lattice.periodic).filter(|r| rows.contains(r))
+                else {
                     continue;
                 };
-                let (du, dv) = (i as f64 - a[0], v - a[1]);
-                let s = (a[2] + du * slope_u + dv * slope_v).clamp(s_lo, s_hi);
-                let place = if with_place {
-                    let mut at = [0.0; 3];
-                    at[self.vertex[1]] = (du * acv - acu * dv) * inverse;
-                    at[self.vertex[2]] = (abu * dv - du * abv) * inverse;
-                    at[self.vertex[0]] = 1.0 - at[self.vertex[1]] - at[self.vertex[2]];
-                    [at[1], at[2]]
+                let (p, q) = (long.crossing(j as f64), short.crossing(j as f64));
+                let (first, end) = if p <= q {
+                    (above(p), above(q))
                 } else {
-                    [0.0; 2]
+                    (above(q), above(p))
                 };
-                hit(Fragment {
-                    line: row_start + column as usize,
-                    depth: lattice.depth(s),
-                    place,
-                });
+                if first >= end {
+                    continue;
+                }
+                let Some(plane) = plane.get_or_insert_with(|| Plane::new(self.corner)).valid()
+                else {
+                    return;
+                };
+                let row_start = row as usize * lattice.nx as usize;
+                for i in first..end {
+                    let Some(column) = wrap(i, lattice.nx, lattice.periodic) else {
+                        continue;
+                    };
+                    let (du, dv) = (i as f64 - a[0], j as f64 - a[1]);
+                    hit(Fragment {
+                        line: row_start + column as usize,
+                        depth: lattice.depth(plane.s_m(du, dv)),
+                        place: if with_place {
+                            plane.place(du, dv, self.vertex)
+                        } else {
+                            [0.0; 2]
+                        },
+                    });
+                }
             }
         }
+    }
+}
+
+/// The row or column of the lattice that an unwrapped one is; `None` past the rim of an open lattice.
+#[inline]
+fn wrap(k: i64, n: u32, periodic: bool) -> Option<u32> {
+    if (0..i64::from(n)).contains(&k) {
+        Some(k as u32)
+    } else if periodic {
+        Some(k.rem_euclid(i64::from(n)) as u32)
+    } else {
+        None
+    }
+}
+
+/// An edge from its lower to its upper end: where it crosses the rows of the lattice.
+struct Edge {
+    start: [f64; 3],
+    rise: f64,
+}
+
+impl Edge {
+    #[inline]
+    fn new(start: [f64; 3], end: [f64; 3]) -> Self {
+        Self {
+            start,
+            rise: (end[0] - start[0]) / (end[1] - start[1]),
+        }
+    }
+
+    #[inline]
+    fn crossing(&self, v: f64) -> f64 {
+        self.start[0] + (v - self.start[1]) * self.rise
+    }
+}
+
+/// Depth and barycentric coordinates over the lattice, from the first corner on.
+struct Plane {
+    ab: [f64; 3],
+    ac: [f64; 3],
+    inverse: f64,
+    s_m: f64,
+    slope: [f64; 2],
+    s_range_m: [f64; 2],
+}
+
+impl Plane {
+    fn new([a, b, c]: [[f64; 3]; 3]) -> Self {
+        let minus = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
+        let (ab, ac) = (minus(b), minus(c));
+        let inverse = 1.0 / (ab[0] * ac[1] - ac[0] * ab[1]);
+        Self {
+            inverse,
+            s_m: a[2],
+            slope: [
+                (ab[2] * ac[1] - ac[2] * ab[1]) * inverse,
+                (ac[2] * ab[0] - ab[2] * ac[0]) * inverse,
+            ],
+            s_range_m: [a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2])],
+            ab,
+            ac,
+        }
+    }
+
+    /// `None` for a triangle that is seen exactly edge-on.
+    fn valid(&self) -> Option<&Self> {
+        self.inverse.is_finite().then_some(self)
+    }
+
+    #[inline]
+    fn s_m(&self, du: f64, dv: f64) -> f64 {
+        // a triangle that is nearly edge-on is steep: rounding must not carry a hit past its vertices
+        (self.s_m + du * self.slope[0] + dv * self.slope[1])
+            .clamp(self.s_range_m[0], self.s_range_m[1])
+    }
+
+    /// Barycentric coordinates of the second and third vertex, in the user's order.
+    fn place(&self, du: f64, dv: f64, vertex: [usize; 3]) -> [f64; 2] {
+        let mut at = [0.0; 3];
+        at[vertex[1]] = (du * self.ac[1] - self.ac[0] * dv) * self.inverse;
+        at[vertex[2]] = (self.ab[0] * dv - du * self.ab[1]) * self.inverse;
+        at[vertex[0]] = 1.0 - at[vertex[1]] - at[vertex[2]];
+        [at[1], at[2]]
     }
 }
 

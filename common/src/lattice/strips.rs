@@ -4,21 +4,20 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{Lattice, Projected};
+use super::{Lattice, Projected, Soup};
 
 /// Which triangles to draw in which strip.
 pub struct Strips {
     rows_in_strip: u32,
     rows: u32,
-    /// Start of each strip's list in `triangles`; empty when there is only one strip.
+    /// Start of each strip's list in `triangles`, and its length at the end.
     start: Vec<usize>,
     triangles: Vec<u32>,
-    all: u32,
 }
 
 impl Strips {
     /// Sorts triangles into strips of about `lines_in_strip` lines (at least one row of them).
-    pub fn new(lattice: &Lattice, triangles: &[[DVec3; 3]], lines_in_strip: usize) -> Self {
+    pub fn new(lattice: &Lattice, soup: &Soup, lines_in_strip: usize) -> Self {
         let rows_in_strip = (lines_in_strip / lattice.nx.max(1) as usize)
             .clamp(1, lattice.ny.max(1) as usize) as u32;
         let mut strips = Self {
@@ -26,10 +25,13 @@ impl Strips {
             rows: lattice.ny,
             start: Vec::new(),
             triangles: Vec::new(),
-            all: triangles.len() as u32,
         };
+        let reached = soup.reached(lattice);
         if strips.len() > 1 {
-            strips.sort(lattice, triangles);
+            strips.sort(lattice, soup.triangles(), &reached);
+        } else {
+            strips.start = vec![0, reached.len()];
+            strips.triangles = reached;
         }
         strips
     }
@@ -50,26 +52,18 @@ impl Strips {
     }
 
     /// The triangles that reach into a strip, each once, by rising number.
-    pub fn triangles(&self, strip: u32) -> impl Iterator<Item = u32> {
-        let (some, all) = if self.start.is_empty() {
-            (&[][..], 0..self.all)
-        } else {
-            (
-                &self.triangles[self.start[strip as usize]..self.start[strip as usize + 1]],
-                0..0,
-            )
-        };
-        some.iter().copied().chain(all)
+    pub fn triangles(&self, strip: u32) -> &[u32] {
+        &self.triangles[self.start[strip as usize]..self.start[strip as usize + 1]]
     }
 
-    fn sort(&mut self, lattice: &Lattice, triangles: &[[DVec3; 3]]) {
-        let mut members: Vec<(u32, u32)> = Vec::with_capacity(triangles.len() * 2);
-        for (t, triangle) in triangles.iter().enumerate() {
-            if let Some(projected) = Projected::new(lattice, triangle) {
+    fn sort(&mut self, lattice: &Lattice, triangles: &[[DVec3; 3]], reached: &[u32]) {
+        let mut members: Vec<(u32, u32)> = Vec::with_capacity(reached.len() * 2);
+        for &t in reached {
+            if let Some(projected) = Projected::new(lattice, &triangles[t as usize]) {
                 for rows in self.wrapped(lattice, &projected).into_iter().flatten() {
                     let strips =
                         rows.start / self.rows_in_strip..=(rows.end - 1) / self.rows_in_strip;
-                    members.extend(strips.map(|s| (s, t as u32)));
+                    members.extend(strips.map(|s| (s, t)));
                 }
             }
         }
@@ -111,15 +105,15 @@ impl Strips {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Extent, Lattice, Projected};
+    use super::super::{Extent, Lattice, Projected, Soup};
     use super::*;
     use proptest::prelude::*;
 
     fn hits(lattice: &Lattice, triangles: &[[DVec3; 3]], lines_in_strip: usize) -> Vec<u32> {
-        let strips = Strips::new(lattice, triangles, lines_in_strip);
+        let strips = Strips::new(lattice, &Soup::new(triangles.to_vec()), lines_in_strip);
         let mut hits = vec![0; lattice.lines()];
         for s in 0..strips.len() {
-            for t in strips.triangles(s) {
+            for &t in strips.triangles(s) {
                 if let Some(p) = Projected::new(lattice, &triangles[t as usize]) {
                     p.scan(lattice, strips.rows(s), false, |f| hits[f.line] += 1);
                 }

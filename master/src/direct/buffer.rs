@@ -2,9 +2,8 @@
 
 use std::ops::Range;
 
-use glam::DVec3;
 use nestrad_common::elements::{self, Elements};
-use nestrad_common::lattice::{Lattice, Projected, Strips};
+use nestrad_common::lattice::{Lattice, Projected, Soup, Strips};
 
 /// The element on top, and the face that it shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -31,23 +30,23 @@ impl Buffer {
     pub(super) fn draw(
         &mut self,
         lattice: &Lattice,
-        triangles: &[[DVec3; 3]],
+        soup: &Soup,
         elements: &Elements,
         floor_m: Option<f64>,
         mut drawn: impl FnMut(u32),
         mut strip: impl FnMut(&Self, Range<u32>),
     ) {
         let floor = u64::from(floor_m.map_or(0, |z| lattice.depth_of_height(z))) << 32;
-        let strips = Strips::new(lattice, triangles, LINES_IN_STRIP);
+        let strips = Strips::new(lattice, soup, LINES_IN_STRIP);
         let nx = lattice.nx as usize;
         for s in 0..strips.len() {
             let rows = strips.rows(s);
             let first_line = rows.start as usize * nx;
             self.key.clear();
             self.key.resize(rows.len() * nx, floor);
-            for t in strips.triangles(s) {
+            for &t in strips.triangles(s) {
                 let t = t as usize;
-                let Some(projected) = Projected::new(lattice, &triangles[t]) else {
+                let Some(projected) = Projected::new(lattice, &soup.triangles()[t]) else {
                     continue;
                 };
                 let (first, n) = (elements.first[t], elements.divisions[t]);

@@ -74,7 +74,7 @@ pub(super) fn add(
     direct: &mut Direct,
 ) {
     let source = &problem.sources[k];
-    let (scene, bands) = (&problem.scene, problem.bands.len());
+    let bands = problem.bands.len();
     let towards = -source.direction;
     let lattice = Lattice::new(towards, &world.extent, line_area_m2, random);
     // perpendicular to the source
@@ -101,7 +101,7 @@ pub(super) fn add(
     } = scratch;
     buffer.draw(
         &lattice,
-        &scene.triangles,
+        &world.soup,
         &world.elements,
         world.soil.map(|s| s.z_m),
         |element| met[element as usize] += 1,

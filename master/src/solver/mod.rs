@@ -23,10 +23,15 @@ use thiserror::Error;
 
 use crate::exchange::{Exchange, Outlook};
 use crate::world::World;
+use spread::Spread;
+pub use spread::Variances;
 use sweep::Gather;
 
 /// Values per band of a group of `N` bands.
 type Lane<const N: usize> = [f64; N];
+
+/// Batches in a half of the exchange.
+pub const HALF_BATCHES: usize = 8;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -68,11 +73,8 @@ pub struct Irradiance {
     pub passes: u32,
     /// Estimated remaining change of absorbed power relative to incoming, per band.
     pub left: Vec<f64>,
-    /// Variance of absorbed power that the sampling of the exchange leaves, W², indexed
-    /// `element * bands + band`.
-    pub element_variance_W2: Vec<f64>,
-    /// The same per organ, `organ * bands + band`.
-    pub organ_variance_W2: Vec<f64>,
+    /// What the sampling of the exchange leaves uncertain, per band.
+    pub variances: Vec<Variances>,
 }
 
 impl Irradiance {
@@ -106,14 +108,8 @@ pub fn solve(
         bands: bands.len(),
         passes: 0,
         left: vec![0.0; bands.len()],
-        element_variance_W2: vec![0.0; world.elements.len() * bands.len()],
-        organ_variance_W2: vec![0.0; problem.scene.organs.len() * bands.len()],
+        variances: vec![Variances::default(); bands.len()],
     };
-    let organ_of_element: Vec<u32> = world
-        .triangle_of_element
-        .iter()
-        .map(|&t| problem.scene.organ[t as usize])
-        .collect();
     let mut done = 0;
     while done < bands.len() {
         let group = &bands[done..(done + WIDEST).min(bands.len())];
@@ -127,7 +123,6 @@ pub fn solve(
             bands: group,
             incoming_W,
             tolerance,
-            organ_of_element: &organ_of_element,
         };
         match group.len() {
             1 => part.solve::<1>(done, &mut all)?,
@@ -153,7 +148,6 @@ struct Group<'a> {
     bands: &'a [usize],
     incoming_W: &'a [f64],
     tolerance: &'a Tolerance,
-    organ_of_element: &'a [u32],
 }
 
 impl Group<'_> {
@@ -184,8 +178,8 @@ impl Group<'_> {
         let mut passes = 0;
         while passes < self.tolerance.most_passes {
             let omega = relaxation.map(|r| r.omega);
-            let from_a = gather.sweep(0, a, &y.radiosity, &direct, &omega, &mut x);
-            let from_b = gather.sweep(1, b, &x.radiosity, &direct, &omega, &mut y);
+            let from_a = gather.sweep(0, a, &y, &direct, &omega, &mut x);
+            let from_b = gather.sweep(1, b, &x, &direct, &omega, &mut y);
             passes += 1;
             for (k, left) in left.iter_mut().enumerate() {
                 let incoming = self.incoming_W[self.bands[k]].max(f64::MIN_POSITIVE);
@@ -214,23 +208,17 @@ impl Group<'_> {
                 }
             }
         }
-        let organs = self.problem.scene.organs.len();
-        for (batches, seen) in [(a, &y.radiosity), (b, &x.radiosity)] {
-            let spread = gather.spread(batches, seen, self.organ_of_element, organs);
-            for k in 0..self.bands.len() {
-                // the result is the mean of both halves
-                for (e, v) in spread.element_W2.iter().enumerate() {
-                    all.element_variance_W2[e * all.bands + first + k] += 0.25 * v[k];
-                }
-                for (o, pulls) in spread
-                    .organ_W
-                    .chunks_exact(batches.len().max(1))
-                    .enumerate()
-                {
-                    let squares: f64 = pulls.iter().map(|p| p[k] * p[k]).sum();
-                    all.organ_variance_W2[o * all.bands + first + k] +=
-                        0.25 * spread::unbias(batches.len()) * squares;
-                }
+        for (k, &band) in self.bands.iter().enumerate() {
+            let spread = Spread {
+                problem: self.problem,
+                world: self.world,
+                outlook: self.outlook,
+                band,
+                halves: [a, b],
+            };
+            for (half, seen) in [&y, &x].into_iter().enumerate() {
+                let seen: Vec<f64> = seen.radiosity.iter().map(|lane| lane[k]).collect();
+                spread.add(half, &seen, &mut all.variances[first + k]);
             }
         }
         Ok(())

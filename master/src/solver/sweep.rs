@@ -94,14 +94,15 @@ impl<'a, const N: usize> Gather<'a, N> {
         }
     }
 
-    /// `into.irradiance += omega * (E0 + F seen - into.irradiance)`, and the radiosities that follow.
+    /// `into.irradiance += omega * (E0 + F radiosity of the other half - into.irradiance)`, and the
+    /// radiosities that follow. A row without lines in this half takes the irradiance of the other.
     ///
     /// Returns how much the absorbed power changed, per band, summed without regard to sign, W.
     pub fn sweep(
         &self,
         half: usize,
         batches: &[BatchRows],
-        seen: &[Lane<N>],
+        other: &Half<N>,
         direct: &[Lane<N>],
         omega: &Lane<N>,
         into: &mut Half<N>,
@@ -112,9 +113,14 @@ impl<'a, const N: usize> Gather<'a, N> {
         let soil_radiosity = &mut rest[..rows - faces];
 
         let relaxed = |row: usize, old: &Lane<N>| -> (Lane<N>, Lane<N>) {
-            let gathered = gather(batches, seen, row, self.outlook.weight[half][row]);
-            let step: Lane<N> =
-                std::array::from_fn(|k| omega[k] * (direct[row][k] + gathered[k] - old[k]));
+            let weight = self.outlook.weight[half][row];
+            let gathered = if weight > 0.0 {
+                let sum = gather(batches, &other.radiosity, row);
+                std::array::from_fn(|k| direct[row][k] + sum[k] * weight)
+            } else {
+                other.irradiance[row]
+            };
+            let step: Lane<N> = std::array::from_fn(|k| omega[k] * (gathered[k] - old[k]));
             (std::array::from_fn(|k| old[k] + step[k]), step)
         };
         let of_faces: Vec<Lane<N>> = face_irradiance
@@ -191,15 +197,10 @@ impl<'a, const N: usize> Gather<'a, N> {
     }
 }
 
-/// Mean radiosity of what a row sees, over all its lines: the irradiance that they bring. All
-/// entries weigh the same, so this is a plain mean; what is buried is dark and is not in the weight.
+/// Sum of the radiosities of what a row sees: all lines weigh the same. What is buried is dark, and is
+/// not in the weight.
 #[inline]
-fn gather<const N: usize>(
-    batches: &[BatchRows],
-    seen: &[Lane<N>],
-    row: usize,
-    weight: f64,
-) -> Lane<N> {
+fn gather<const N: usize>(batches: &[BatchRows], seen: &[Lane<N>], row: usize) -> Lane<N> {
     let mut sum = [0.0; N];
     for batch in batches {
         for &end in batch.row(row) {
@@ -209,5 +210,5 @@ fn gather<const N: usize>(
             }
         }
     }
-    sum.map(|s| s * weight)
+    sum
 }

@@ -42,7 +42,7 @@ const LINES_IN_STRIP: usize = 1 << 14;
 
 /// Calls `line` with the hits of every line of the lattice, by rising depth; lines by rising number.
 pub(crate) fn for_each_line(block: &Block, lattice: &Lattice, mut line: impl FnMut(usize, &[Hit])) {
-    let strips = Strips::new(lattice, &block.triangles, LINES_IN_STRIP);
+    let strips = Strips::new(lattice, &block.soup, LINES_IN_STRIP);
     let mut strip = Strip::default();
     for s in 0..strips.len() {
         strip.draw(block, lattice, strips.rows(s), strips.triangles(s));
@@ -68,16 +68,16 @@ impl Strip {
         block: &Block,
         lattice: &Lattice,
         rows: std::ops::Range<u32>,
-        triangles: impl Iterator<Item = u32>,
+        triangles: &[u32],
     ) {
         let nx = lattice.nx as usize;
         self.first_line = rows.start as usize * nx;
         self.drawn.clear();
         self.end.clear();
         self.end.resize((rows.end - rows.start) as usize * nx, 0);
-        for t in triangles {
+        for &t in triangles {
             let t = t as usize;
-            let Some(projected) = Projected::new(lattice, &block.triangles[t]) else {
+            let Some(projected) = Projected::new(lattice, &block.soup.triangles()[t]) else {
                 continue;
             };
             let (first, n) = (block.first[t], block.divisions[t]);

@@ -46,7 +46,7 @@ impl Tracer {
     pub fn new(block: &Block) -> Self {
         let extent = &block.extent;
         let (mut lo, mut hi) =
-            geometry::bounds(block.triangles.iter().flatten()).unwrap_or_default();
+            geometry::bounds(block.soup.triangles().iter().flatten()).unwrap_or_default();
         let (z_min_m, z_max_m) = (lo.z, hi.z);
         if extent.periodic {
             (lo.x, lo.y, hi.x, hi.y) = (
@@ -61,9 +61,9 @@ impl Tracer {
         // f32 rounding of a box and of a ray's origin, and the nodes that obvhs takes as passed
         let padding = HALF_EXTENT * f64::from(f32::EPSILON) * 4.0 + 2.0 * NEAREST_NODE;
 
-        let mut primitives = Vec::with_capacity(block.triangles.len());
-        let mut boxes = Vec::with_capacity(block.triangles.len());
-        for (t, triangle) in block.triangles.iter().enumerate() {
+        let mut primitives = Vec::with_capacity(block.soup.triangles().len());
+        let mut boxes = Vec::with_capacity(block.soup.triangles().len());
+        for (t, triangle) in block.soup.triangles().iter().enumerate() {
             let Some((a, b)) = geometry::bounds(triangle) else {
                 continue;
             };
@@ -171,11 +171,11 @@ impl Tracer {
             .ray_traverse(tree_ray, &mut RayHit::none(), |_, p| {
                 let (t, copy) = self.primitives[p];
                 let away = [pattern[0] + copy[0], pattern[1] + copy[1]];
-                if t == ray.source && away == [0, 0] {
+                if Some(t) == ray.source && away == [0, 0] {
                     return f32::INFINITY;
                 }
                 let Some(hit) = edges.meet(
-                    &block.triangles[t as usize],
+                    &block.soup.triangles()[t as usize],
                     ray.origin - block.shift_m(away),
                 ) else {
                     return f32::INFINITY;
@@ -202,8 +202,8 @@ pub(crate) struct FaceRay {
     pub(crate) origin: DVec3,
     /// Unit vector.
     pub(crate) direction: DVec3,
-    /// The local triangle that it leaves; it cannot hit it again (but copies of it it can).
-    pub(crate) source: u32,
+    /// The local triangle that it leaves, if it does not leave the soil; it cannot hit it again (but copies of it it can).
+    pub(crate) source: Option<u32>,
 }
 
 /// What is seen when no triangle is hit within reach.
@@ -224,8 +224,7 @@ fn beyond(block: &Block, origin: DVec3, direction: DVec3, soil_t: f64, random: f
     }
     let last = ends.far_levels.saturating_sub(1);
     let level = (((z - bottom) / (top - bottom) * f64::from(last) + random) as u32).min(last);
-    let bin = ((direction.z.abs() * f64::from(ends.far_bins)) as u32)
-        .min(ends.far_bins.saturating_sub(1));
+    let bin = ends.far_bin(direction.z.abs());
     block.local(if direction.z < 0.0 {
         ends.far_from_below(bin, level)
     } else {

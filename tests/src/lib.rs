@@ -1,0 +1,20 @@
+//! What the accuracy tests share: scenes built by hand, solves, form factors counted from rows,
+//! statistics. Where an answer comes from is said in the test that needs it.
+
+#![allow(
+    non_snake_case,
+    reason = "units in names are written as units: irradiance_W_m2"
+)]
+#![allow(
+    clippy::unwrap_used,
+    reason = "this crate is used by tests only, where a panic is a failure"
+)]
+
+pub mod canopies;
+pub mod enclosure;
+pub mod files;
+pub mod form_factor;
+pub mod reference;
+pub mod scenery;
+pub mod solving;
+pub mod statistics;
