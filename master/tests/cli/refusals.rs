@@ -80,7 +80,7 @@ fn bad_files_are_refused_with_their_name_and_line() {
         (
             "ground.8",
             b"0 0\n1 0\n",
-            &["ground.8", "differ in x and in y"],
+            &["ground.8, line 2", "apart in x and in y"],
         ),
         ("ground.8", b"0 0\n", &["ground.8", "line"]),
         ("scene.toml", b"scene = 3\n", &["scene.toml, line 1"]),
