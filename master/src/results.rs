@@ -5,6 +5,7 @@ use nestrad_common::problem::Problem;
 
 use crate::direct::Direct;
 use crate::exchange::Outlook;
+use crate::far_field::closure::flux_weight;
 use crate::solution::{Balance, Estimate, ItemLight, SoilMap, Solution};
 use crate::solver::{Irradiance, Variances};
 use crate::world::{self, World};
@@ -172,6 +173,9 @@ impl Parts<'_> {
     /// Scattered power that leaves the scene upwards and downwards, W.
     fn escaped_W(&self, band: &Band, k: usize) -> [f64; 2] {
         let world = self.world;
+        if world.ends.far_len() > 0 {
+            return self.escaped_far_W(k);
+        }
         let mut sum = [0.0; 2];
         let mut add = |row: usize, radiosity: f64| {
             let power = radiosity * world.row_area_m2(row as u32) * self.outlook.exposed[row];
@@ -195,6 +199,25 @@ impl Parts<'_> {
         }
         for row in world.ends.faces() as usize..world.rows() {
             add(row, band.soil_albedo * self.irradiance.mean(row, k));
+        }
+        sum
+    }
+}
+
+impl Parts<'_> {
+    /// Scattered power that leaves through the top and bottom levels of the far field, W.
+    fn escaped_far_W(&self, k: usize) -> [f64; 2] {
+        let ends = &self.world.ends;
+        let of = |end: u32| {
+            self.irradiance.far_W_m2[(end - ends.far_start()) as usize * self.irradiance.bands + k]
+        };
+        let mut sum = [0.0; 2];
+        for bin in 0..ends.far_bins {
+            let weight = self.world.ground_area_m2() * flux_weight(bin, ends.far_bins);
+            sum[0] += weight * of(ends.far_from_below(bin, ends.far_levels - 1));
+            if self.world.soil.is_none() {
+                sum[1] += weight * of(ends.far_from_above(bin, 0));
+            }
         }
         sum
     }

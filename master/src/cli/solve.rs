@@ -164,7 +164,7 @@ impl Task {
         output::check_writable(&self.out)?;
         watch.lap("input");
 
-        let plan = Plan::new(&loaded.problem, &self.settings);
+        let plan = Plan::new(&loaded.problem, &self.settings)?;
         for line in &plan.reasons {
             self.notes.say("plan", line);
         }

@@ -8,13 +8,13 @@
 //! so the variance of anything linear in the irradiances is
 //! `G / (G - 1) sum_g (its change)²` over the G batches of each half.
 
-use nestrad_common::problem::Problem;
 use rayon::prelude::*;
 
 use super::sweep::Gather;
-use super::{HALF_BATCHES, Lane};
-use crate::exchange::{BatchRows, Outlook};
-use crate::world::{self, World};
+use super::{HALF_BATCHES, Lane, System};
+use crate::exchange::BatchRows;
+use crate::far_field::closure::flux_weight;
+use crate::world;
 
 type Pull = Lane<HALF_BATCHES>;
 
@@ -34,13 +34,17 @@ pub struct Variances {
 
 /// A band's batches in one half, around the solution.
 pub(super) struct Spread<'a> {
-    pub(super) problem: &'a Problem,
-    pub(super) world: &'a World,
-    pub(super) outlook: &'a Outlook,
+    pub(super) system: System<'a>,
     /// Number of the band.
     pub(super) band: usize,
     /// The halves of the exchange.
     pub(super) halves: [&'a [BatchRows]; 2],
+}
+
+/// What a pull does to irradiances and to the radiosities of the far ends.
+struct Change {
+    irradiance: Vec<Pull>,
+    far: Vec<Pull>,
 }
 
 /// What of a pull is still on its way when it is no longer followed, in parts of the pull.
@@ -60,10 +64,10 @@ impl Spread<'_> {
 
     /// How each batch of a half pulls the irradiance of each row.
     fn pulls(&self, half: usize, seen: &[f64]) -> Vec<Pull> {
-        let buried = self.world.ends.buried();
+        let buried = self.system.world.ends.buried();
         let batches = self.halves[half];
-        let weights = &self.outlook.weight[half];
-        (0..self.world.rows())
+        let weights = &self.system.outlook.weight[half];
+        (0..self.system.world.rows())
             .into_par_iter()
             .with_min_len(1024)
             .map(|row| {
@@ -81,15 +85,19 @@ impl Spread<'_> {
     }
 
     /// The change of the result, the mean of both halves, that pulls on one half bring about.
-    fn followed(&self, half: usize, pulls: Vec<Pull>) -> Vec<Pull> {
-        let gather = Gather::<HALF_BATCHES>::new(
-            self.problem,
-            self.world,
-            self.outlook,
-            &[self.band; HALF_BATCHES],
-        );
-        let dark = vec![[0.0; HALF_BATCHES]; self.world.ends.len() - self.world.rows()];
-        let none = vec![[0.0; HALF_BATCHES]; self.world.rows()];
+    fn followed(&self, half: usize, pulls: Vec<Pull>) -> Change {
+        let System {
+            problem,
+            world,
+            outlook,
+            far,
+            ..
+        } = self.system;
+        let gather =
+            Gather::<HALF_BATCHES>::new(problem, world, outlook, far, &[self.band; HALF_BATCHES]);
+        let dark =
+            vec![[0.0; HALF_BATCHES]; self.system.world.ends.len() - self.system.world.rows()];
+        let none = vec![[0.0; HALF_BATCHES]; self.system.world.rows()];
         let first = gather.absorbed(&pulls);
         let mut pulled = gather.start(pulls.clone(), &dark);
         let mut other = gather.start(none.clone(), &dark);
@@ -111,24 +119,37 @@ impl Spread<'_> {
                 break;
             }
         }
-        pulled
-            .irradiance
-            .iter()
-            .zip(&other.irradiance)
-            .map(|(a, b)| std::array::from_fn(|g| 0.5 * (a[g] + b[g])))
-            .collect()
+        let mean = |a: &[Pull], b: &[Pull]| {
+            a.iter()
+                .zip(b)
+                .map(|(a, b)| std::array::from_fn(|g| 0.5 * (a[g] + b[g])))
+                .collect()
+        };
+        let far_start = world.ends.far_start() as usize;
+        Change {
+            irradiance: mean(&pulled.irradiance, &other.irradiance),
+            far: mean(
+                &pulled.radiosity[far_start..],
+                &other.radiosity[far_start..],
+            ),
+        }
     }
 
-    fn collect(&self, change: &[Pull], sum: &mut Variances) {
-        let (scene, elements) = (&self.problem.scene, self.world.elements.len());
-        let band = &self.problem.bands[self.band];
+    fn collect(&self, change: &Change, sum: &mut Variances) {
+        let Change {
+            irradiance: change,
+            far,
+        } = change;
+        let (scene, elements) = (&self.system.problem.scene, self.system.world.elements.len());
+        let band = &self.system.problem.bands[self.band];
         let soil_triangle = world::is_soil(scene);
         sum.triangle_W2.resize(scene.triangles.len(), 0.0);
-        sum.soil_W2_m4.resize(self.world.rows() - 2 * elements, 0.0);
+        sum.soil_W2_m4
+            .resize(self.system.world.rows() - 2 * elements, 0.0);
         sum.organ_W2.resize(scene.organs.len(), 0.0);
         let mut organs = vec![[0.0; HALF_BATCHES]; scene.organs.len()];
         let mut balance = [[0.0; HALF_BATCHES]; 4];
-        for (t, first) in self.world.elements.first.windows(2).enumerate() {
+        for (t, first) in self.system.world.elements.first.windows(2).enumerate() {
             let optics = band.materials[scene.material[t] as usize];
             let faces = [optics.upper, optics.lower];
             let mut absorbed = [0.0; HALF_BATCHES];
@@ -143,7 +164,7 @@ impl Spread<'_> {
             add(&mut balance[usize::from(soil_triangle[t])], 1.0, &absorbed);
             sum.triangle_W2[t] += variance(&absorbed);
         }
-        for row in 2 * elements..self.world.rows() {
+        for row in 2 * elements..self.system.world.rows() {
             let area = self.exposed_area_m2(row);
             add(
                 &mut balance[1],
@@ -152,6 +173,23 @@ impl Spread<'_> {
             );
             self.escape(&mut balance, row, band.soil_albedo * area, &change[row]);
             sum.soil_W2_m4[row - 2 * elements] += variance(&change[row]);
+        }
+        if !far.is_empty() {
+            // what leaves the scene crosses its top and bottom levels
+            let (world, ends) = (self.system.world, &self.system.world.ends);
+            (balance[2], balance[3]) = ([0.0; HALF_BATCHES], [0.0; HALF_BATCHES]);
+            for bin in 0..ends.far_bins {
+                let weight = world.ground_area_m2() * flux_weight(bin, ends.far_bins);
+                let at = |end: u32| &far[(end - ends.far_start()) as usize];
+                add(
+                    &mut balance[2],
+                    weight,
+                    at(ends.far_from_below(bin, ends.far_levels - 1)),
+                );
+                if world.soil.is_none() {
+                    add(&mut balance[3], weight, at(ends.far_from_above(bin, 0)));
+                }
+            }
         }
         for (sum, organ) in sum.organ_W2.iter_mut().zip(&organs) {
             *sum += variance(organ);
@@ -165,12 +203,20 @@ impl Spread<'_> {
     }
 
     fn exposed_area_m2(&self, row: usize) -> f64 {
-        self.world.row_area_m2(row as u32) * self.outlook.exposed[row]
+        self.system.world.row_area_m2(row as u32) * self.system.outlook.exposed[row]
     }
 
     fn escape(&self, balance: &mut [Pull; 4], row: usize, weight: f64, change: &Pull) {
-        add(&mut balance[2], weight * self.outlook.to_sky[row], change);
-        add(&mut balance[3], weight * self.outlook.to_void[row], change);
+        add(
+            &mut balance[2],
+            weight * self.system.outlook.to_sky[row],
+            change,
+        );
+        add(
+            &mut balance[3],
+            weight * self.system.outlook.to_void[row],
+            change,
+        );
     }
 }
 
