@@ -5,6 +5,7 @@
 use glam::DVec3;
 use nestrad_common::optics::LeafOptics;
 use nestrad_common::problem::Problem;
+use nestrad_master::exchange::{BlockOf, trace_here};
 use nestrad_master::plan::{Plan, Settings};
 use nestrad_master::solution::Solution;
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
@@ -58,6 +59,38 @@ fn one_thread_and_two_give_the_same_bits() {
     }
 }
 
+/// The scene as one job, or as several that own every third triangle and some soil each.
+#[test]
+fn one_job_and_many_give_the_same_bits() {
+    let problem = maize();
+    let plan = Plan::new(&problem, &Settings::default());
+    let mut sampling = plan.sampling.unwrap();
+    sampling.batches = 2;
+    let world = plan.world(&problem);
+    let whole = BlockOf::whole(&world);
+    let parts: Vec<BlockOf> = (0..3)
+        .map(|part| BlockOf {
+            triangles: whole
+                .triangles
+                .iter()
+                .map(|&(t, _)| (t, t % 3 == part))
+                .collect(),
+            soil_cells: whole
+                .soil_cells
+                .iter()
+                .copied()
+                .filter(|c| c / 100 % 3 == part)
+                .collect(),
+        })
+        .collect();
+    let of = |blocks: &[BlockOf]| {
+        trace_here(&problem.scene, &world, blocks, &sampling, || {})
+            .unwrap()
+            .batches
+    };
+    assert!(of(&[whole]) == of(&parts), "rows differ");
+}
+
 #[test]
 fn the_same_seed_gives_the_same_bits_and_another_does_not() {
     let problem = maize();
@@ -71,6 +104,25 @@ fn the_same_seed_gives_the_same_bits_and_another_does_not() {
     let first = with(1);
     assert!(first == with(1));
     assert!(first.organs != with(2).organs);
+}
+
+/// Direct light alone is sampled, too.
+#[test]
+fn another_seed_samples_a_black_canopy_elsewhere() {
+    let mut problem = problem(
+        &small_maize(),
+        &[(LeafOptics::default(), 0.0)],
+        uniform_sky(2, 1),
+    );
+    problem.bands[0].materials.fill(LeafOptics::default());
+    let with = |seed| {
+        let settings = Settings {
+            seed,
+            ..Settings::default()
+        };
+        solve(&problem, &settings).solution
+    };
+    assert!(with(1).organs != with(2).organs);
 }
 
 /// A mirrored canopy under mirrored light: with every triangle turned over to keep its upper face up.
@@ -254,7 +306,7 @@ fn any_scenery() -> impl Strategy<Value = Scenery> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig { cases: 24, ..ProptestConfig::default() })]
+    #![proptest_config(ProptestConfig { cases: 24, failure_persistence: None, ..ProptestConfig::default() })]
 
     /// Nothing absorbs less than nothing, all together no more than comes in, and what comes in is
     /// accounted for.
