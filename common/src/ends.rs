@@ -70,6 +70,11 @@ impl Ends {
         self.rows() + 4
     }
 
+    /// The bin of a direction with this cosine to the vertical, 0 to 1.
+    pub fn far_bin(&self, cosine: f64) -> u32 {
+        ((cosine * f64::from(self.far_bins)) as u32).min(self.far_bins.saturating_sub(1))
+    }
+
     /// Scattered light at a level, in bin `bin` of the light that comes down (from above).
     pub fn far_from_above(&self, bin: u32, level: u32) -> u32 {
         self.far_start() + bin * self.far_levels + level

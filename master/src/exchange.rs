@@ -36,6 +36,22 @@ impl Sampling {
         let directions = self.batches / 2 * self.sets_per_batch * self.axes.count();
         0.5 * f64::from(directions) / self.line_area_m2
     }
+
+    /// The longest line through a layer of that height, metres; infinite with rays.
+    pub fn longest_sight_m(&self, height_m: f64) -> f64 {
+        (0..self.batches)
+            .flat_map(|b| batch_message(self, b).lines)
+            .filter_map(|l| l.direction)
+            .map(|d| height_m / d.z)
+            .fold(
+                if self.sets_per_batch == 0 {
+                    f64::INFINITY
+                } else {
+                    0.0
+                },
+                f64::max,
+            )
+    }
 }
 
 /// The rows of one batch.
@@ -48,6 +64,18 @@ pub struct BatchRows {
 }
 
 impl BatchRows {
+    /// Rows of these lengths.
+    pub fn new(lengths: &[u32], ends: Vec<u32>) -> Self {
+        let mut start = Vec::with_capacity(lengths.len() + 1);
+        let mut total = 0;
+        start.push(0);
+        for l in lengths {
+            total += l;
+            start.push(total);
+        }
+        Self { start, ends }
+    }
+
     /// What a row sees.
     #[inline]
     pub fn row(&self, row: usize) -> &[u32] {
@@ -192,8 +220,31 @@ pub fn world_message(world: &World) -> v1::World {
 
 /// A batch: its directions and everything random in it.
 pub fn batch_message(sampling: &Sampling, index: u32) -> v1::Batch {
-    let mut rng = stream(sampling.seed, Purpose::Lines, u64::from(index));
-    let lines = axes(sampling.axes, sampling.sets_per_batch, &mut rng)
+    let numbers = (sampling.seed, Purpose::Lines, u64::from(index));
+    v1::Batch {
+        index,
+        rays: Some(v1::Rays {
+            seed: sampling.seed,
+            least_samples: sampling.least_samples,
+            batches_in_half: sampling.batches / 2,
+            lines_per_m2: sampling.lines_per_m2(),
+        }),
+        ..batch_of_lines(
+            numbers,
+            (sampling.axes, sampling.sets_per_batch),
+            sampling.line_area_m2,
+        )
+    }
+}
+
+/// Lines along sets of axes. `numbers` says which random numbers: seed, purpose and index.
+pub fn batch_of_lines(
+    numbers: (u64, Purpose, u64),
+    (kind, sets): (Axes, u32),
+    line_area_m2: f64,
+) -> v1::Batch {
+    let mut rng = stream(numbers.0, numbers.1, numbers.2);
+    let lines = axes(kind, sets, &mut rng)
         .into_iter()
         .map(|axis| v1::Lines {
             direction: Some(vector(axis.direction)),
@@ -201,18 +252,12 @@ pub fn batch_message(sampling: &Sampling, index: u32) -> v1::Batch {
             random_y: rng.random(),
             random_count: rng.random(),
             // every line weighs the same: a direction of larger weight has more of them
-            line_area_m2: sampling.line_area_m2 / axis.weight,
+            line_area_m2: line_area_m2 / axis.weight,
         })
         .collect();
     v1::Batch {
-        index,
         lines,
-        rays: Some(v1::Rays {
-            seed: sampling.seed,
-            least_samples: sampling.least_samples,
-            batches_in_half: sampling.batches / 2,
-            lines_per_m2: sampling.lines_per_m2(),
-        }),
+        ..v1::Batch::default()
     }
 }
 

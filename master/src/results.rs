@@ -1,89 +1,226 @@
 //! From irradiances of elements to light per organ and triangle, and the energy balance.
 
+use nestrad_common::optics::Band;
 use nestrad_common::problem::Problem;
 
 use crate::direct::Direct;
 use crate::exchange::Outlook;
+use crate::far_field::closure::flux_weight;
 use crate::solution::{Balance, Estimate, ItemLight, SoilMap, Solution};
-use crate::solver::Irradiance;
+use crate::solver::{Irradiance, Variances};
 use crate::world::{self, World};
 
-/// Puts the results together. `scattering`: the numbers of the bands that `irradiance` holds; the
-/// others have direct light only.
-pub fn assemble(
-    problem: &Problem,
-    world: &World,
-    direct: &Direct,
-    outlook: &Outlook,
-    irradiance: &Irradiance,
-    scattering: &[usize],
-) -> Solution {
-    let bands = problem.bands.len();
-    let scene = &problem.scene;
-    let mut solution = Solution {
-        organs: vec![ItemLight::default(); scene.organs.len() * bands],
-        triangles: vec![ItemLight::default(); scene.triangles.len() * bands],
-        organ_area_m2: vec![0.0; scene.organs.len()],
-        triangle_area_m2: vec![0.0; scene.triangles.len()],
-        ..Solution::default()
-    };
-    for e in 0..world.elements.len() {
-        let t = world.triangle_of_element[e] as usize;
-        solution.triangle_area_m2[t] += world.elements.area_m2[e];
-        solution.organ_area_m2[scene.organ[t] as usize] += world.elements.area_m2[e];
-    }
-    for (b, band) in problem.bands.iter().enumerate() {
-        let solved = scattering.iter().position(|&s| s == b);
-        let of_row = |row: usize| match solved {
-            Some(k) => irradiance.mean(row, k) * outlook.exposed[row],
-            None => direct.irradiance_W_m2[row * bands + b],
+/// All that the results are put together from.
+pub struct Parts<'a> {
+    /// What was solved.
+    pub problem: &'a Problem,
+    /// Elements and soil cells.
+    pub world: &'a World,
+    /// Uncollided light.
+    pub direct: &'a Direct,
+    /// What rows see of the sky.
+    pub outlook: &'a Outlook,
+    /// Of the bands in `scattering`; the others have direct light only.
+    pub irradiance: &'a Irradiance,
+    /// Numbers of the bands that were solved.
+    pub scattering: &'a [usize],
+}
+
+impl Parts<'_> {
+    /// Puts the results together.
+    pub fn assemble(&self) -> Solution {
+        let (bands, scene) = (self.problem.bands.len(), &self.problem.scene);
+        let mut solution = Solution {
+            organs: vec![ItemLight::default(); scene.organs.len() * bands],
+            triangles: vec![ItemLight::default(); scene.triangles.len() * bands],
+            organ_area_m2: vec![0.0; scene.organs.len()],
+            triangle_area_m2: vec![0.0; scene.triangles.len()],
+            ..Solution::default()
         };
-        for e in 0..world.elements.len() {
-            let t = world.triangle_of_element[e] as usize;
-            let optics = band.materials[scene.material[t] as usize];
+        for (e, &t) in self.world.triangle_of_element.iter().enumerate() {
+            let area = self.world.elements.area_m2[e];
+            solution.triangle_area_m2[t as usize] += area;
+            solution.organ_area_m2[scene.organ[t as usize] as usize] += area;
+        }
+        for b in 0..bands {
+            self.add_items(b, &mut solution);
+        }
+        finish(&mut solution.organs, &solution.organ_area_m2, bands);
+        finish(&mut solution.triangles, &solution.triangle_area_m2, bands);
+        solution.soil = self.soil_map();
+        solution.balance = (0..bands).map(|b| self.balance(b, &solution)).collect();
+        solution
+    }
+
+    /// Mean irradiance of a row, W m⁻² of all of it.
+    fn irradiance_W_m2(&self, row: usize, b: usize) -> f64 {
+        match self.solved(b) {
+            Some(k) => self.irradiance.mean(row, k) * self.outlook.exposed[row],
+            None => self.first_W_m2(row, b),
+        }
+    }
+
+    fn first_W_m2(&self, row: usize, b: usize) -> f64 {
+        self.direct.irradiance_W_m2[row * self.problem.bands.len() + b]
+    }
+
+    fn solved(&self, b: usize) -> Option<usize> {
+        self.scattering.iter().position(|&s| s == b)
+    }
+
+    fn variances(&self, b: usize) -> Option<&Variances> {
+        self.solved(b).map(|k| &self.irradiance.variances[k])
+    }
+
+    /// Sums over the elements of each item, with variances in place of standard errors.
+    fn add_items(&self, b: usize, solution: &mut Solution) {
+        let (bands, scene) = (self.problem.bands.len(), &self.problem.scene);
+        for (e, &t) in self.world.triangle_of_element.iter().enumerate() {
+            let t = t as usize;
+            let optics = self.problem.bands[b].materials[scene.material[t] as usize];
             let (upper, lower) = (optics.upper.absorptance(), optics.lower.absorptance());
-            let area = world.elements.area_m2[e];
-            let (eu, el) = (of_row(2 * e), of_row(2 * e + 1));
-            let first = [
-                direct.irradiance_W_m2[2 * e * bands + b],
-                direct.irradiance_W_m2[(2 * e + 1) * bands + b],
-            ];
-            let sampled = solved.map_or(0.0, |k| {
-                irradiance.element_variance_W2[e * irradiance.bands + k]
-            });
-            let item = ItemLight {
-                irradiance_upper_W_m2: eu * area,
-                irradiance_lower_W_m2: el * area,
-                absorbed_W: area * (upper * eu + lower * el),
-                absorbed_direct_W: area * (upper * first[0] + lower * first[1]),
-                absorbed_se_W: sampled + direct.element_variance_W2[e * bands + b],
-            };
-            for to in [
+            let area = self.world.elements.area_m2[e];
+            let (on_upper, on_lower) = (
+                self.irradiance_W_m2(2 * e, b),
+                self.irradiance_W_m2(2 * e + 1, b),
+            );
+            let (first_upper, first_lower) =
+                (self.first_W_m2(2 * e, b), self.first_W_m2(2 * e + 1, b));
+            for item in [
                 &mut solution.triangles[t * bands + b],
                 &mut solution.organs[scene.organ[t] as usize * bands + b],
             ] {
-                to.irradiance_upper_W_m2 += item.irradiance_upper_W_m2;
-                to.irradiance_lower_W_m2 += item.irradiance_lower_W_m2;
-                to.absorbed_W += item.absorbed_W;
-                to.absorbed_direct_W += item.absorbed_direct_W;
-                to.absorbed_se_W += item.absorbed_se_W;
+                item.irradiance_upper_W_m2 += on_upper * area;
+                item.irradiance_lower_W_m2 += on_lower * area;
+                item.absorbed_W += area * (upper * on_upper + lower * on_lower);
+                item.absorbed_direct_W += area * (upper * first_upper + lower * first_lower);
             }
+            solution.triangles[t * bands + b].absorbed_se_W +=
+                self.direct.element_variance_W2[e * bands + b];
         }
-        for o in 0..scene.organs.len() {
-            let sampled = solved.map_or(0.0, |k| {
-                irradiance.organ_variance_W2[o * irradiance.bands + k]
-            });
-            solution.organs[o * bands + b].absorbed_se_W =
-                sampled + direct.organ_variance_W2[o * bands + b];
+        for (o, item) in solution
+            .organs
+            .iter_mut()
+            .skip(b)
+            .step_by(bands)
+            .enumerate()
+        {
+            item.absorbed_se_W = self.direct.organ_variance_W2[o * bands + b];
+        }
+        if let Some(variances) = self.variances(b) {
+            let add = |items: &mut [ItemLight], of: &[f64]| {
+                for (item, v) in items.iter_mut().skip(b).step_by(bands).zip(of) {
+                    item.absorbed_se_W += v;
+                }
+            };
+            add(&mut solution.triangles, &variances.triangle_W2);
+            add(&mut solution.organs, &variances.organ_W2);
         }
     }
-    finish(&mut solution.organs, &solution.organ_area_m2, bands);
-    finish(&mut solution.triangles, &solution.triangle_area_m2, bands);
-    solution.soil = soil_map(world, direct, irradiance, scattering, bands);
-    solution.balance = balance(
-        problem, world, direct, outlook, irradiance, scattering, &solution,
-    );
-    solution
+
+    fn soil_map(&self) -> Option<SoilMap> {
+        let soil = self.world.soil?;
+        let bands = self.problem.bands.len();
+        let irradiance_W_m2 = (0..soil.cells() as usize * bands)
+            .map(|k| {
+                let (cell, b) = (k / bands, k % bands);
+                Estimate {
+                    value: self.irradiance_W_m2(self.world.ends.soil(cell as u32) as usize, b),
+                    se: self.variances(b).map_or(0.0, |v| v.soil_W2_m4[cell].sqrt()),
+                }
+            })
+            .collect();
+        Some(SoilMap {
+            min_m: soil.min_m,
+            cell_m: soil.cell_m,
+            nx: soil.nx as usize,
+            ny: soil.ny as usize,
+            irradiance_W_m2,
+        })
+    }
+
+    fn balance(&self, b: usize, solution: &Solution) -> Balance {
+        let (bands, band) = (self.problem.bands.len(), &self.problem.bands[b]);
+        let [mut plants, mut soil] = [0.0; 2];
+        for (t, is_soil) in world::is_soil(&self.problem.scene).into_iter().enumerate() {
+            let absorbed = solution.triangles[t * bands + b].absorbed_W;
+            *(if is_soil { &mut soil } else { &mut plants }) += absorbed;
+        }
+        for row in self.world.ends.faces() as usize..self.world.rows() {
+            soil += (1.0 - band.soil_albedo)
+                * self.world.row_area_m2(row as u32)
+                * self.irradiance_W_m2(row, b);
+        }
+        let [up, scattered_down] = self.solved(b).map_or([0.0; 2], |k| self.escaped_W(band, k));
+        let down = scattered_down + self.direct.passed_W[b];
+        let incoming = self.direct.incoming_W[b];
+        let variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
+        let estimate = |value: f64, k: usize| Estimate {
+            value,
+            se: variance[k].sqrt(),
+        };
+        Balance {
+            band: band.name.clone(),
+            incoming_W: incoming,
+            absorbed_plants_W: estimate(plants, 0),
+            absorbed_soil_W: estimate(soil, 1),
+            escaped_up_W: estimate(up, 2),
+            escaped_down_W: estimate(down, 3),
+            closure_W: estimate(incoming - plants - soil - up - down, 4),
+        }
+    }
+
+    /// Scattered power that leaves the scene upwards and downwards, W.
+    fn escaped_W(&self, band: &Band, k: usize) -> [f64; 2] {
+        let world = self.world;
+        if world.ends.far_len() > 0 {
+            return self.escaped_far_W(k);
+        }
+        let mut sum = [0.0; 2];
+        let mut add = |row: usize, radiosity: f64| {
+            let power = radiosity * world.row_area_m2(row as u32) * self.outlook.exposed[row];
+            sum[0] += power * self.outlook.to_sky[row];
+            sum[1] += power * self.outlook.to_void[row];
+        };
+        for (e, &t) in world.triangle_of_element.iter().enumerate() {
+            let optics = band.materials[self.problem.scene.material[t as usize] as usize];
+            let (on_upper, on_lower) = (
+                self.irradiance.mean(2 * e, k),
+                self.irradiance.mean(2 * e + 1, k),
+            );
+            add(
+                2 * e,
+                optics.upper.rho * on_upper + optics.lower.tau * on_lower,
+            );
+            add(
+                2 * e + 1,
+                optics.lower.rho * on_lower + optics.upper.tau * on_upper,
+            );
+        }
+        for row in world.ends.faces() as usize..world.rows() {
+            add(row, band.soil_albedo * self.irradiance.mean(row, k));
+        }
+        sum
+    }
+}
+
+impl Parts<'_> {
+    /// Scattered power that leaves through the top and bottom levels of the far field, W.
+    fn escaped_far_W(&self, k: usize) -> [f64; 2] {
+        let ends = &self.world.ends;
+        let of = |end: u32| {
+            self.irradiance.far_W_m2[(end - ends.far_start()) as usize * self.irradiance.bands + k]
+        };
+        let mut sum = [0.0; 2];
+        for bin in 0..ends.far_bins {
+            let weight = self.world.ground_area_m2() * flux_weight(bin, ends.far_bins);
+            sum[0] += weight * of(ends.far_from_below(bin, ends.far_levels - 1));
+            if self.world.soil.is_none() {
+                sum[1] += weight * of(ends.far_from_above(bin, 0));
+            }
+        }
+        sum
+    }
 }
 
 /// From sums over elements to means over area, and from variances to standard errors.
@@ -96,109 +233,4 @@ fn finish(items: &mut [ItemLight], area_m2: &[f64], bands: usize) {
         }
         item.absorbed_se_W = item.absorbed_se_W.sqrt();
     }
-}
-
-fn soil_map(
-    world: &World,
-    direct: &Direct,
-    irradiance: &Irradiance,
-    scattering: &[usize],
-    bands: usize,
-) -> Option<SoilMap> {
-    let soil = world.soil?;
-    let mut map = SoilMap {
-        min_m: soil.min_m,
-        cell_m: soil.cell_m,
-        nx: soil.nx as usize,
-        ny: soil.ny as usize,
-        irradiance_W_m2: vec![Estimate::default(); soil.cells() as usize * bands],
-    };
-    for cell in 0..soil.cells() {
-        let row = world.ends.soil(cell) as usize;
-        for b in 0..bands {
-            map.irradiance_W_m2[cell as usize * bands + b].value =
-                match scattering.iter().position(|&s| s == b) {
-                    Some(k) => irradiance.mean(row, k),
-                    None => direct.irradiance_W_m2[row * bands + b],
-                };
-        }
-    }
-    Some(map)
-}
-
-fn balance(
-    problem: &Problem,
-    world: &World,
-    direct: &Direct,
-    outlook: &Outlook,
-    irradiance: &Irradiance,
-    scattering: &[usize],
-    solution: &Solution,
-) -> Vec<Balance> {
-    let bands = problem.bands.len();
-    let is_soil = world::is_soil(&problem.scene);
-    let value = |value: f64| Estimate { value, se: 0.0 };
-    problem
-        .bands
-        .iter()
-        .enumerate()
-        .map(|(b, band)| {
-            let of = |soil: bool| -> f64 {
-                (0..is_soil.len())
-                    .filter(|&t| is_soil[t] == soil)
-                    .map(|t| solution.triangles[t * bands + b].absorbed_W)
-                    .sum()
-            };
-            let plane: f64 = solution.soil.as_ref().map_or(0.0, |map| {
-                let cell = map.cell_m.x * map.cell_m.y;
-                (0..map.nx * map.ny)
-                    .map(|c| cell * map.irradiance_W_m2[c * bands + b].value)
-                    .sum::<f64>()
-                    * (1.0 - band.soil_albedo)
-            });
-            let (plants, soil) = (of(false), of(true) + plane);
-            let [up, down] = match scattering.iter().position(|&s| s == b) {
-                Some(k) => escaped(problem, world, irradiance, outlook, band, k),
-                None => [0.0, 0.0],
-            };
-            let (incoming, down) = (direct.incoming_W[b], down + direct.passed_W[b]);
-            Balance {
-                band: band.name.clone(),
-                incoming_W: incoming,
-                absorbed_plants_W: value(plants),
-                absorbed_soil_W: value(soil),
-                escaped_up_W: value(up),
-                escaped_down_W: value(down),
-                closure_W: value(incoming - plants - soil - up - down),
-            }
-        })
-        .collect()
-}
-
-/// Scattered power that leaves the scene upwards and downwards, W.
-fn escaped(
-    problem: &Problem,
-    world: &World,
-    irradiance: &Irradiance,
-    outlook: &Outlook,
-    band: &nestrad_common::optics::Band,
-    k: usize,
-) -> [f64; 2] {
-    let mut sum = [0.0; 2];
-    let mut add = |row: usize, radiosity: f64| {
-        let power = radiosity * world.row_area_m2(row as u32) * outlook.exposed[row];
-        sum[0] += power * outlook.to_sky[row];
-        sum[1] += power * outlook.to_void[row];
-    };
-    for e in 0..world.elements.len() {
-        let m = problem.scene.material[world.triangle_of_element[e] as usize] as usize;
-        let optics = band.materials[m];
-        let (eu, el) = (irradiance.mean(2 * e, k), irradiance.mean(2 * e + 1, k));
-        add(2 * e, optics.upper.rho * eu + optics.lower.tau * el);
-        add(2 * e + 1, optics.lower.rho * el + optics.upper.tau * eu);
-    }
-    for row in world.ends.faces() as usize..world.rows() {
-        add(row, band.soil_albedo * irradiance.mean(row, k));
-    }
-    sum
 }

@@ -5,12 +5,14 @@ use thiserror::Error;
 
 use crate::direct::direct_light;
 use crate::exchange::{BlockOf, Exchange, ExchangeError, Outlook, Traced, trace_here};
+use crate::far_field::closure::{FarRows, from_layers};
 use crate::output::progress::Progress;
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
-use crate::results;
+use crate::results::Parts;
 use crate::solution::Solution;
-use crate::solver::{self, Irradiance, SolveError};
+use crate::solver::{Irradiance, SolveError, System};
+use crate::world::World;
 
 /// What a solve gives, and what it took.
 #[derive(Clone, Debug)]
@@ -54,8 +56,12 @@ pub fn solve(
 ) -> Result<Finished, RunError> {
     let world = plan.world(problem);
     watch.lap("elements");
-    let seed = plan.sampling.map_or(1, |s| s.seed);
-    let direct = direct_light(problem, &world, &plan.direct_line_areas_m2(problem), seed);
+    let direct = direct_light(
+        problem,
+        &world,
+        &plan.direct_line_areas_m2(problem),
+        plan.seed,
+    );
     watch.lap("direct light");
 
     let mut exchange = Exchange::default();
@@ -73,28 +79,35 @@ pub fn solve(
         progress.finish();
         watch.lap("exchange");
         outlook = exchange.outlook(&world);
-        let fixed = vec![0.0; (world.ends.len() - world.rows()) * problem.bands.len()];
-        irradiance = solver::solve(
+        let far = plan
+            .far_field
+            .map(|f| FarRows::trace(problem, &world, &f))
+            .transpose()
+            .map_err(ExchangeError::from)?;
+        let fixed_W_m2 = fixed(problem, &world, plan);
+        watch.lap("far field");
+        let system = System {
             problem,
-            &world,
-            &exchange,
-            &outlook,
-            &direct.irradiance_W_m2,
-            &fixed,
-            &plan.scattering_bands,
-            &direct.incoming_W,
-            &plan.tolerance,
-        )?;
+            world: &world,
+            exchange: &exchange,
+            outlook: &outlook,
+            far: far.as_ref(),
+            direct_W_m2: &direct.irradiance_W_m2,
+            fixed_W_m2: &fixed_W_m2,
+            incoming_W: &direct.incoming_W,
+        };
+        irradiance = system.solve(&plan.scattering_bands, &plan.tolerance)?;
         watch.lap("solve");
     }
-    let solution = results::assemble(
+    let parts = Parts {
         problem,
-        &world,
-        &direct,
-        &outlook,
-        &irradiance,
-        &plan.scattering_bands,
-    );
+        world: &world,
+        direct: &direct,
+        outlook: &outlook,
+        irradiance: &irradiance,
+        scattering: &plan.scattering_bands,
+    };
+    let solution = parts.assemble();
     watch.lap("results");
     let counters = Counters {
         elements: world.elements.len(),
@@ -103,4 +116,23 @@ pub fn solve(
         passes: irradiance.passes,
     };
     Ok(Finished { solution, counters })
+}
+
+/// Radiosities of what is not a row: dark, but for the unshaded soil beyond the map of an open scene and
+/// the far field's start.
+fn fixed(problem: &Problem, world: &World, plan: &Plan) -> Vec<f64> {
+    let bands = problem.bands.len();
+    let mut fixed = vec![0.0; (world.ends.len() - world.rows()) * bands];
+    let at = |end: u32| (end - world.ends.rows()) as usize * bands;
+    if world.soil.is_some() && !world.extent.periodic {
+        for (b, band) in problem.bands.iter().enumerate() {
+            let incoming: f64 = problem.sources.iter().map(|s| s.irradiance_W_m2[b]).sum();
+            fixed[at(world.ends.outer_soil()) + b] = band.soil_albedo * incoming;
+        }
+    }
+    if let Some(resolution) = &plan.far_field {
+        fixed[at(world.ends.far_start())..]
+            .copy_from_slice(&from_layers(problem, world, resolution));
+    }
+    fixed
 }

@@ -148,6 +148,12 @@ impl World {
         }
     }
 
+    /// Area of the pattern, or of the box around an open scene, m².
+    pub fn ground_area_m2(&self) -> f64 {
+        let size = self.extent.max_m - self.extent.min_m;
+        size.x * size.y
+    }
+
     /// Number of rows: faces and soil cells.
     pub fn rows(&self) -> usize {
         self.ends.rows() as usize

@@ -22,7 +22,7 @@ pub fn by(estimator: Estimator) -> Settings {
 
 /// Solves as planned for these settings.
 pub fn solve(problem: &Problem, settings: &Settings) -> Finished {
-    finish(problem, &Plan::new(problem, settings)).unwrap()
+    finish(problem, &Plan::new(problem, settings).unwrap()).unwrap()
 }
 
 /// Solves by a plan that a test has changed.

@@ -23,3 +23,9 @@ pub fn trace(block: &Block, tracer: &Tracer, batch: &v1::Batch) -> v1::Rows {
     rays::complete(block, tracer, batch, &mut traced);
     rows::collect(block, &traced)
 }
+
+/// What is seen from the levels of the far field, along the lines of a batch: one row for each far
+/// end, in their order. The block is the whole scene.
+pub fn trace_levels(block: &Block, batch: &v1::Batch) -> v1::Rows {
+    rows::of_levels(block, &lines::from_levels(block, batch))
+}

@@ -57,3 +57,31 @@ pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
         rays: traced.rays,
     }
 }
+
+/// Sorts what levels see into rows of the far ends.
+pub(crate) fn of_levels(block: &Block, looks: &[Pair]) -> v1::Rows {
+    let first = block.local(block.ends.far_start());
+    let mut rows = v1::Rows {
+        lengths: vec![0; block.ends.far_len() as usize],
+        ..v1::Rows::default()
+    };
+    for &(from, _) in looks {
+        rows.lengths[(from - first) as usize] += 1;
+    }
+    let mut total = 0;
+    let mut next: Vec<usize> = rows
+        .lengths
+        .iter()
+        .map(|&l| {
+            total += l as usize;
+            total - l as usize
+        })
+        .collect();
+    rows.ends = vec![0; total];
+    for &(from, seen) in looks {
+        let place = &mut next[(from - first) as usize];
+        rows.ends[*place] = block.seen_as[seen as usize];
+        *place += 1;
+    }
+    rows
+}

@@ -83,18 +83,7 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
             )
         }
     };
-    let geometry = Geometry {
-        pattern: inputs.pattern.as_ref().map(read_pattern).transpose()?,
-        soil: inputs.soil,
-        unit: inputs.unit.unwrap_or_default(),
-        meshes: inputs
-            .scenes
-            .iter()
-            .map(|path| read_mesh(path))
-            .collect::<Result<_, _>>()?,
-    };
-
-    let (scene, origins) = build_scene(geometry)?;
+    let (scene, origins) = build_scene(read_geometry(inputs)?)?;
     let bands = optics
         .into_iter()
         .map(|optics| resolve_band(optics, &scene, &origins))
@@ -113,6 +102,26 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
         },
         inspection,
         sky,
+    })
+}
+
+/// Looks through the geometry alone, as [`load`] would: for scenes whose optics or light are not good
+/// yet.
+pub fn inspect_geometry(inputs: &Inputs) -> Result<Inspection, LoadError> {
+    let (scene, origins) = build_scene(read_geometry(inputs)?)?;
+    Ok(inspect(&scene, &origins))
+}
+
+fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {
+    Ok(Geometry {
+        pattern: inputs.pattern.as_ref().map(read_pattern).transpose()?,
+        soil: inputs.soil,
+        unit: inputs.unit.unwrap_or_default(),
+        meshes: inputs
+            .scenes
+            .iter()
+            .map(|path| read_mesh(path))
+            .collect::<Result<_, _>>()?,
     })
 }
 

@@ -50,6 +50,28 @@ pub struct Lattice {
     s_steps_per_m: f64,
 }
 
+/// The sides of a lattice of `lines` points, of which one is near `wanted_y`.
+fn sides(lines: f64, wanted_y: f64, random: f64) -> [f64; 2] {
+    let off = |ny: f64| ((lines / ny).round() * ny / lines - 1.0).abs();
+    let tried = (0..SIDES_TRIED).map(|k| {
+        (wanted_y * (0.75 + 0.5 * k as f64 / SIDES_TRIED as f64))
+            .round()
+            .max(1.0)
+    });
+    let best = tried.fold(wanted_y.round(), |best, ny| {
+        if off(ny) < off(best) { ny } else { best }
+    });
+    let nx = if off(best) < 1e-3 {
+        (lines / best).round()
+    } else {
+        (lines / best + random).floor()
+    };
+    [nx.min(MAX_SIDE), best]
+}
+
+/// Sides that are tried to find a lattice of the wanted number of lines.
+const SIDES_TRIED: u32 = 32;
+
 /// Rounds a lattice coordinate to 2^-20 of a step, so that copies of a vertex one pattern apart stay
 /// exactly one pattern apart.
 ///
@@ -67,8 +89,8 @@ impl Lattice {
     /// A lattice of lines whose cross-section is close to `line_area_m2` (m², > 0).
     ///
     /// `random` are three numbers in [0, 1): the offset of the lattice in x and y (in steps), and
-    /// the rounding of the number of lines: it is rounded up or down at random so that the expected
-    /// number of lines is exactly the area divided by `line_area_m2`. A lattice may be empty.
+    /// the rounding of the number of lines, where no lattice comes within a thousandth of it: up or
+    /// down at random, so that the expected number is exact. A lattice may be empty.
     pub fn new(direction: DVec3, extent: &Extent, line_area_m2: f64, random: [f64; 3]) -> Self {
         let d = direction;
         let shear = DVec2::new(d.x / d.z, d.y / d.z);
@@ -91,9 +113,7 @@ impl Lattice {
             0.5
         };
         let wanted_y = (size.y / (side * d.z.powf(along_x - 1.0))).clamp(1.0, MAX_SIDE);
-        let ny = wanted_y.round();
-        let lines = size.x * size.y * d.z / line_area_m2;
-        let nx = (lines / ny + random[2]).floor().min(MAX_SIDE);
+        let [nx, ny] = sides(size.x * size.y * d.z / line_area_m2, wanted_y, random[2]);
         let steps_per_m = DVec2::new(nx.max(1.0), ny) / size;
         // s = (z - z_min) / d.z runs over at most this range
         let s_range = (height / d.z).max(f64::MIN_POSITIVE);
@@ -223,20 +243,23 @@ mod tests {
 
     #[test]
     fn the_expected_number_of_lines_is_exact() {
-        let d = DVec3::new(0.6, 0.0, 0.8);
         let n = 2000;
-        let mean = (0..n)
-            .map(|k| {
+        for (z, area) in [(0.8, 0.013), (0.05, 0.013), (0.05, 0.0007), (1.0, 0.7)] {
+            let d = DVec3::new((1.0f64 - z * z).sqrt(), 0.0, z);
+            let lines = |k: u32| {
                 Lattice::new(
                     d,
                     &extent(true),
-                    0.013,
+                    area,
                     [0.0, 0.0, (f64::from(k) + 0.5) / f64::from(n)],
                 )
                 .lines()
-            })
-            .sum::<usize>() as f64
-            / f64::from(n);
-        assert!((mean - 1.2 * 0.8 / 0.013).abs() < 0.05, "{mean}");
+            };
+            let mean = (0..n).map(lines).sum::<usize>() as f64 / f64::from(n);
+            assert!(
+                (mean / (1.2 * z / area) - 1.0).abs() < 2e-3,
+                "{z} {area}: {mean}"
+            );
+        }
     }
 }

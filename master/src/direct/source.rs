@@ -74,7 +74,7 @@ pub(super) fn add(
     direct: &mut Direct,
 ) {
     let source = &problem.sources[k];
-    let (scene, bands) = (&problem.scene, problem.bands.len());
+    let bands = problem.bands.len();
     let towards = -source.direction;
     let lattice = Lattice::new(towards, &world.extent, line_area_m2, random);
     // perpendicular to the source

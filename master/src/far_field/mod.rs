@@ -5,6 +5,7 @@
 //! `master/docs/far_field.md`.
 
 mod beam;
+pub mod closure;
 pub mod layers;
 mod leaf;
 mod matrix;

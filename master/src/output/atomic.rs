@@ -20,6 +20,22 @@ use tempfile::TempDir;
 
 use super::error::{Fault, OutputError};
 
+/// Refuses a folder that results could not be written into. It is not made, and nothing in it changes:
+/// this is for the beginning of a long computation, which may still fail.
+pub fn check_writable(folder: &Path) -> Result<(), OutputError> {
+    // "" is the parent of a relative name
+    let there = |at: &&Path| at.as_os_str().is_empty() || at.exists();
+    let nearest = folder.ancestors().find(there).unwrap_or(folder);
+    let nearest = if nearest.as_os_str().is_empty() {
+        Path::new(".")
+    } else {
+        nearest
+    };
+    tempfile::tempfile_in(nearest)
+        .map(drop)
+        .map_err(|error| OutputError::at(folder, error))
+}
+
 /// A folder that is about to be given new files.
 #[derive(Debug)]
 pub struct Staging {
@@ -229,9 +245,24 @@ mod tests {
     }
 
     #[test]
+    fn a_folder_is_checked_without_a_trace() {
+        let folder = with_old_result();
+        let before = listing(folder.path());
+        assert!(check_writable(folder.path()).is_ok());
+        assert!(check_writable(&folder.path().join("new").join("out")).is_ok());
+        assert!(check_writable(Path::new("no such folder")).is_ok());
+        assert_eq!(listing(folder.path()), before);
+    }
+
+    #[test]
     fn an_impossible_folder_is_named() {
         let folder = with_old_result();
         let path = folder.path().join("my").join("out");
+        let early = check_writable(&path).expect_err("a file is in the way");
+        assert_eq!(
+            early.to_string(),
+            format!("cannot write {}", path.display())
+        );
         let error = Staging::begin(&path).expect_err("a file is in the way");
         assert_eq!(
             error.to_string(),

@@ -8,6 +8,7 @@
 pub mod atomic;
 mod csv;
 mod error;
+pub mod errors;
 mod finite;
 mod number;
 mod parquet;
@@ -24,6 +25,7 @@ use std::path::Path;
 
 use nestrad_common::scene::Scene;
 
+pub use self::atomic::check_writable;
 pub use self::error::{Fault, OutputError};
 
 use self::atomic::Staging;

@@ -8,14 +8,15 @@
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use nestrad_common::scene::{Material, Scene};
+use nestrad_common::scene::Scene;
 
+use super::errors::organ_errors;
 use super::resources::Usage;
 use crate::solution::{Balance, Estimate, Solution};
 
 const COLUMNS: usize = 80;
 
-/// Writes the energy balance of all bands, the mean standard error of organs, and what it cost.
+/// Writes the energy balance of all bands, the standard error of organs, and what it cost.
 pub fn write(
     out: &mut impl Write,
     scene: &Scene,
@@ -170,12 +171,12 @@ impl Unit {
 }
 
 fn write_organ_errors(out: &mut impl Write, scene: &Scene, solution: &Solution) -> io::Result<()> {
-    let mut line = String::from("standard error of an organ, area-weighted mean:");
-    for (band, balance) in solution.balance.iter().enumerate() {
-        let Some(error) = mean_organ_error(scene, solution, band) else {
+    let mut line = String::from("standard error of an organ, rms, of the mean:");
+    for errors in organ_errors(scene, solution) {
+        let Some(percent) = errors.rms_percent else {
             continue;
         };
-        let entry = format!(" {} {:.2} %;", shortened(&balance.band), 100.0 * error);
+        let entry = format!(" {} {percent:.2} %;", shortened(&errors.band));
         if line.chars().count() + entry.chars().count() > COLUMNS {
             writeln!(out, "{line}")?;
             line = String::from(" ");
@@ -186,27 +187,6 @@ fn write_organ_errors(out: &mut impl Write, scene: &Scene, solution: &Solution) 
         Some(line) => writeln!(out, "{line}"),
         None => Ok(()),
     }
-}
-
-/// Mean over the plants' area of an organ's standard error relative to its absorbed power; none
-/// where nothing is absorbed.
-fn mean_organ_error(scene: &Scene, solution: &Solution, band: usize) -> Option<f64> {
-    let bands = solution.balance.len();
-    let mut sum = 0.0;
-    let mut weight = 0.0;
-    for (triangle, &organ) in scene.organ.iter().enumerate() {
-        let material = scene
-            .materials
-            .get(*scene.material.get(triangle)? as usize)?;
-        let light = solution.organs.get(organ as usize * bands + band)?;
-        if *material == Material::Soil || light.absorbed_W <= 0.0 {
-            continue;
-        }
-        let area_m2 = *solution.triangle_area_m2.get(triangle)?;
-        sum += area_m2 * light.absorbed_se_W / light.absorbed_W;
-        weight += area_m2;
-    }
-    (weight > 0.0).then(|| sum / weight)
 }
 
 fn write_usage(out: &mut impl Write, usage: Usage) -> io::Result<()> {
@@ -227,7 +207,7 @@ mod tests {
     use super::*;
     use crate::solution::ItemLight;
     use glam::{DVec2, DVec3};
-    use nestrad_common::scene::{Organ, Pattern};
+    use nestrad_common::scene::{Material, Organ, Pattern};
 
     fn estimate(value: f64, se: f64) -> Estimate {
         Estimate { value, se }
@@ -269,6 +249,7 @@ mod tests {
         organs.extend(vec![light(1.0); balance.len()]);
         let solution = Solution {
             organs,
+            organ_area_m2: vec![1.0, 50.0],
             triangle_area_m2: vec![1.0, 50.0],
             balance,
             ..Solution::default()
@@ -306,7 +287,7 @@ light in W per m² of ground (± one standard error)
 band  incoming        plants         soil    reflected     closure
 PAR     450.00  380.12 ±0.15  40.00 ±0.10  29.89 ±0.12  0.00 ±0.01
 NIR     360.00  304.10 ±0.12  32.00 ±0.08  23.92 ±0.10  0.00 ±0.01
-standard error of an organ, area-weighted mean: PAR 0.50 %; NIR 0.50 %
+standard error of an organ, rms, of the mean: PAR 0.50 %; NIR 0.50 %
 1.23 s, 2.35 s of processor time, at most 300 MiB of memory
 ";
         assert_eq!(text, expected);
@@ -321,7 +302,7 @@ standard error of an organ, area-weighted mean: PAR 0.50 %; NIR 0.50 %
 light in mW, whole scene (± one standard error)
 band  incoming         plants    lost below     reflected       closure
 PAR     90.000  76.025 ±0.030  8.000 ±0.021  5.979 ±0.024  0.000 ±0.002
-standard error of an organ, area-weighted mean: PAR 0.50 %
+standard error of an organ, rms, of the mean: PAR 0.50 %
 1.23 s, 2.35 s of processor time, at most 300 MiB of memory
 ";
         assert_eq!(text, expected);

@@ -22,11 +22,17 @@ use nestrad_common::problem::Problem;
 use thiserror::Error;
 
 use crate::exchange::{Exchange, Outlook};
+use crate::far_field::closure::FarRows;
 use crate::world::World;
+use spread::Spread;
+pub use spread::Variances;
 use sweep::Gather;
 
 /// Values per band of a group of `N` bands.
 type Lane<const N: usize> = [f64; N];
+
+/// Batches in a half of the exchange.
+pub const HALF_BATCHES: usize = 8;
 
 /// When to stop.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -62,17 +68,16 @@ pub enum SolveError {
 pub struct Irradiance {
     /// From the first and from the second half, W m⁻², indexed `row * bands + band`.
     pub halves: [Vec<f64>; 2],
+    /// Radiosity (pi times radiance) of the far ends, W m⁻², indexed `far end * bands + band`.
+    pub far_W_m2: Vec<f64>,
     /// Bands, as indexed here.
     pub bands: usize,
     /// Passes over all rows that it took.
     pub passes: u32,
     /// Estimated remaining change of absorbed power relative to incoming, per band.
     pub left: Vec<f64>,
-    /// Variance of absorbed power that the sampling of the exchange leaves, W², indexed
-    /// `element * bands + band`.
-    pub element_variance_W2: Vec<f64>,
-    /// The same per organ, `organ * bands + band`.
-    pub organ_variance_W2: Vec<f64>,
+    /// What the sampling of the exchange leaves uncertain, per band.
+    pub variances: Vec<Variances>,
 }
 
 impl Irradiance {
@@ -83,99 +88,95 @@ impl Irradiance {
     }
 }
 
-/// Solves for the irradiance of all rows, of the part of them that is not buried, in the given bands.
-///
-/// `direct_W_m2`: E0, indexed `row * all bands + band`. `fixed_W_m2`: radiosity of the ends that are
-/// not rows (sky, void, outer soil, far field), indexed `(end - rows) * all bands + band`.
-pub fn solve(
-    problem: &Problem,
-    world: &World,
-    exchange: &Exchange,
-    outlook: &Outlook,
-    direct_W_m2: &[f64],
-    fixed_W_m2: &[f64],
-    bands: &[usize],
-    incoming_W: &[f64],
-    tolerance: &Tolerance,
-) -> Result<Irradiance, SolveError> {
-    let mut all = Irradiance {
-        halves: [
-            vec![0.0; world.rows() * bands.len()],
-            vec![0.0; world.rows() * bands.len()],
-        ],
-        bands: bands.len(),
-        passes: 0,
-        left: vec![0.0; bands.len()],
-        element_variance_W2: vec![0.0; world.elements.len() * bands.len()],
-        organ_variance_W2: vec![0.0; problem.scene.organs.len() * bands.len()],
-    };
-    let organ_of_element: Vec<u32> = world
-        .triangle_of_element
-        .iter()
-        .map(|&t| problem.scene.organ[t as usize])
-        .collect();
-    let mut done = 0;
-    while done < bands.len() {
-        let group = &bands[done..(done + WIDEST).min(bands.len())];
-        let part = Group {
-            problem,
-            world,
-            exchange,
-            outlook,
-            direct_W_m2,
-            fixed_W_m2,
-            bands: group,
-            incoming_W,
-            tolerance,
-            organ_of_element: &organ_of_element,
+/// What is to be solved.
+#[derive(Clone, Copy)]
+pub struct System<'a> {
+    /// Optics and scene.
+    pub problem: &'a Problem,
+    /// Elements and numbers.
+    pub world: &'a World,
+    /// What rows see.
+    pub exchange: &'a Exchange,
+    /// What of it is not a radiosity to solve for.
+    pub outlook: &'a Outlook,
+    /// What the levels of the far field see, where there is one.
+    pub far: Option<&'a FarRows>,
+    /// E0, indexed `row * all bands + band`.
+    pub direct_W_m2: &'a [f64],
+    /// Radiosity of the ends that are not rows (sky, void, outer soil, buried, far field: its start),
+    /// indexed `(end - rows) * all bands + band`.
+    pub fixed_W_m2: &'a [f64],
+    /// Incoming power of all bands, W: what tolerances are relative to.
+    pub incoming_W: &'a [f64],
+}
+
+impl System<'_> {
+    /// Solves for the irradiance of all rows, of the part of them that is not buried, in the bands with
+    /// these numbers.
+    pub fn solve(&self, bands: &[usize], tolerance: &Tolerance) -> Result<Irradiance, SolveError> {
+        let rows = vec![0.0; self.world.rows() * bands.len()];
+        let far = vec![0.0; self.world.ends.far_len() as usize * bands.len()];
+        let mut all = Irradiance {
+            halves: [rows.clone(), rows],
+            far_W_m2: far,
+            bands: bands.len(),
+            passes: 0,
+            left: vec![0.0; bands.len()],
+            variances: vec![Variances::default(); bands.len()],
         };
-        match group.len() {
-            1 => part.solve::<1>(done, &mut all)?,
-            2 => part.solve::<2>(done, &mut all)?,
-            3 | 4 => part.solve::<4>(done, &mut all)?,
-            _ => part.solve::<WIDEST>(done, &mut all)?,
+        let mut done = 0;
+        while done < bands.len() {
+            let group = Group {
+                system: *self,
+                bands: &bands[done..(done + WIDEST).min(bands.len())],
+                tolerance,
+            };
+            match group.bands.len() {
+                1 => group.solve::<1>(done, &mut all)?,
+                2 => group.solve::<2>(done, &mut all)?,
+                3 | 4 => group.solve::<4>(done, &mut all)?,
+                _ => group.solve::<WIDEST>(done, &mut all)?,
+            }
+            done += group.bands.len();
         }
-        done += group.len();
+        Ok(all)
     }
-    Ok(all)
 }
 
 /// Bands that are solved in one pass over the rows.
 const WIDEST: usize = 8;
 
 struct Group<'a> {
-    problem: &'a Problem,
-    world: &'a World,
-    exchange: &'a Exchange,
-    outlook: &'a Outlook,
-    direct_W_m2: &'a [f64],
-    fixed_W_m2: &'a [f64],
+    system: System<'a>,
     bands: &'a [usize],
-    incoming_W: &'a [f64],
     tolerance: &'a Tolerance,
-    organ_of_element: &'a [u32],
 }
 
 impl Group<'_> {
     fn solve<const N: usize>(&self, first: usize, all: &mut Irradiance) -> Result<(), SolveError> {
-        let total = self.problem.bands.len();
+        let System {
+            problem,
+            world,
+            outlook,
+            far,
+            ..
+        } = self.system;
+        let total = problem.bands.len();
         let lanes = |values: &[f64]| -> Vec<[f64; N]> {
             values
                 .chunks_exact(total)
                 .map(|v| std::array::from_fn(|k| self.bands.get(k).map_or(0.0, |&b| v[b])))
                 .collect()
         };
-        let gather = Gather::<N>::new(self.problem, self.world, self.outlook, self.bands);
+        let gather = Gather::<N>::new(problem, world, outlook, far, self.bands);
         // an element that is partly buried has its light on the rest of it
-        let mut direct = lanes(self.direct_W_m2);
-        for (lane, &exposed) in direct.iter_mut().zip(&self.outlook.exposed) {
+        let mut direct = lanes(self.system.direct_W_m2);
+        for (lane, &exposed) in direct.iter_mut().zip(&outlook.exposed) {
             *lane = lane.map(|e| if exposed > 0.0 { e / exposed } else { 0.0 });
         }
-        let fixed = lanes(self.fixed_W_m2);
-        let (a, b) = self
-            .exchange
-            .batches
-            .split_at(self.exchange.batches.len() / 2);
+        let fixed = lanes(self.system.fixed_W_m2);
+        let batches = &self.system.exchange.batches;
+        let (a, b) = batches.split_at(batches.len() / 2);
         let mut x = gather.start(direct.clone(), &fixed);
         let mut y = gather.start(direct.clone(), &fixed);
 
@@ -184,11 +185,11 @@ impl Group<'_> {
         let mut passes = 0;
         while passes < self.tolerance.most_passes {
             let omega = relaxation.map(|r| r.omega);
-            let from_a = gather.sweep(0, a, &y.radiosity, &direct, &omega, &mut x);
-            let from_b = gather.sweep(1, b, &x.radiosity, &direct, &omega, &mut y);
+            let from_a = gather.sweep(0, a, &y, &direct, &omega, &mut x);
+            let from_b = gather.sweep(1, b, &x, &direct, &omega, &mut y);
             passes += 1;
             for (k, left) in left.iter_mut().enumerate() {
-                let incoming = self.incoming_W[self.bands[k]].max(f64::MIN_POSITIVE);
+                let incoming = self.system.incoming_W[self.bands[k]].max(f64::MIN_POSITIVE);
                 *left = relaxation[k].after(0.5 * (from_a[k] + from_b[k]) / incoming);
             }
             if left.iter().all(|&l| l <= self.tolerance.absorbed) {
@@ -198,7 +199,7 @@ impl Group<'_> {
         for (k, &l) in left.iter().enumerate() {
             if l > self.tolerance.absorbed || l.is_nan() {
                 return Err(SolveError::NotConverged {
-                    band: self.problem.bands[self.bands[k]].name.clone(),
+                    band: problem.bands[self.bands[k]].name.clone(),
                     passes,
                     left: l,
                     wanted: self.tolerance.absorbed,
@@ -214,23 +215,25 @@ impl Group<'_> {
                 }
             }
         }
-        let organs = self.problem.scene.organs.len();
-        for (batches, seen) in [(a, &y.radiosity), (b, &x.radiosity)] {
-            let spread = gather.spread(batches, seen, self.organ_of_element, organs);
+        let far_start = world.ends.far_start() as usize;
+        for (row, (p, q)) in x.radiosity[far_start..]
+            .iter()
+            .zip(&y.radiosity[far_start..])
+            .enumerate()
+        {
             for k in 0..self.bands.len() {
-                // the result is the mean of both halves
-                for (e, v) in spread.element_W2.iter().enumerate() {
-                    all.element_variance_W2[e * all.bands + first + k] += 0.25 * v[k];
-                }
-                for (o, pulls) in spread
-                    .organ_W
-                    .chunks_exact(batches.len().max(1))
-                    .enumerate()
-                {
-                    let squares: f64 = pulls.iter().map(|p| p[k] * p[k]).sum();
-                    all.organ_variance_W2[o * all.bands + first + k] +=
-                        0.25 * spread::unbias(batches.len()) * squares;
-                }
+                all.far_W_m2[row * all.bands + first + k] = 0.5 * (p[k] + q[k]);
+            }
+        }
+        for (k, &band) in self.bands.iter().enumerate() {
+            let spread = Spread {
+                system: self.system,
+                band,
+                halves: [a, b],
+            };
+            for (half, seen) in [&y, &x].into_iter().enumerate() {
+                let seen: Vec<f64> = seen.radiosity.iter().map(|lane| lane[k]).collect();
+                spread.add(half, &seen, &mut all.variances[first + k]);
             }
         }
         Ok(())

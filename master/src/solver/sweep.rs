@@ -5,6 +5,7 @@ use rayon::prelude::*;
 
 use super::Lane;
 use crate::exchange::{BatchRows, Outlook};
+use crate::far_field::closure::FarRows;
 use crate::world::World;
 
 /// Elements that are worked off as one task; a fixed number, so that sums have a fixed order.
@@ -22,26 +23,33 @@ struct Scatter<const N: usize> {
 }
 
 /// Gathers and scatters for a group of `N` bands.
-pub struct Gather<'a, const N: usize> {
+pub(super) struct Gather<'a, const N: usize> {
     pub(super) world: &'a World,
     materials: Vec<Scatter<N>>,
     material_of_element: Vec<u32>,
     soil_albedo: Lane<N>,
     pub(super) outlook: &'a Outlook,
+    far: Option<&'a FarRows>,
 }
 
 /// Irradiance of all rows and radiosity of all ends, in one half.
 #[derive(Clone, Debug)]
-pub struct Half<const N: usize> {
+pub(super) struct Half<const N: usize> {
     /// Irradiance, W m⁻², per row.
-    pub irradiance: Vec<Lane<N>>,
+    pub(super) irradiance: Vec<Lane<N>>,
     /// Radiosity, W m⁻², per end.
-    pub radiosity: Vec<Lane<N>>,
+    pub(super) radiosity: Vec<Lane<N>>,
 }
 
 impl<'a, const N: usize> Gather<'a, N> {
     /// Prepares the bands with these numbers (at most `N`; the rest are black).
-    pub fn new(problem: &Problem, world: &'a World, outlook: &'a Outlook, bands: &[usize]) -> Self {
+    pub(super) fn new(
+        problem: &Problem,
+        world: &'a World,
+        outlook: &'a Outlook,
+        far: Option<&'a FarRows>,
+        bands: &[usize],
+    ) -> Self {
         let lane = |value: &dyn Fn(usize) -> f64| {
             std::array::from_fn(|k| bands.get(k).map_or(0.0, |&b| value(b)))
         };
@@ -69,13 +77,14 @@ impl<'a, const N: usize> Gather<'a, N> {
             material_of_element,
             soil_albedo: lane(&|b| problem.bands[b].soil_albedo),
             outlook,
+            far,
         }
     }
 
     /// A half with the given irradiances, and what they make the rows send out.
     ///
     /// `fixed`: radiosities of the ends that are not rows, from the sky on.
-    pub fn start(&self, irradiance: Vec<Lane<N>>, fixed: &[Lane<N>]) -> Half<N> {
+    pub(super) fn start(&self, irradiance: Vec<Lane<N>>, fixed: &[Lane<N>]) -> Half<N> {
         let mut radiosity = vec![[0.0; N]; self.world.ends.len()];
         radiosity[self.world.rows()..].copy_from_slice(fixed);
         for (e, pair) in irradiance[..self.world.ends.faces() as usize]
@@ -94,14 +103,15 @@ impl<'a, const N: usize> Gather<'a, N> {
         }
     }
 
-    /// `into.irradiance += omega * (E0 + F seen - into.irradiance)`, and the radiosities that follow.
+    /// `into.irradiance += omega * (E0 + F radiosity of the other half - into.irradiance)`, and the
+    /// radiosities that follow. A row without lines in this half takes the irradiance of the other.
     ///
     /// Returns how much the absorbed power changed, per band, summed without regard to sign, W.
-    pub fn sweep(
+    pub(super) fn sweep(
         &self,
         half: usize,
         batches: &[BatchRows],
-        seen: &[Lane<N>],
+        other: &Half<N>,
         direct: &[Lane<N>],
         omega: &Lane<N>,
         into: &mut Half<N>,
@@ -112,9 +122,14 @@ impl<'a, const N: usize> Gather<'a, N> {
         let soil_radiosity = &mut rest[..rows - faces];
 
         let relaxed = |row: usize, old: &Lane<N>| -> (Lane<N>, Lane<N>) {
-            let gathered = gather(batches, seen, row, self.outlook.weight[half][row]);
-            let step: Lane<N> =
-                std::array::from_fn(|k| omega[k] * (direct[row][k] + gathered[k] - old[k]));
+            let weight = self.outlook.weight[half][row];
+            let gathered = if weight > 0.0 {
+                let sum = gather(batches, &other.radiosity, row);
+                std::array::from_fn(|k| direct[row][k] + sum[k] * weight)
+            } else {
+                other.irradiance[row]
+            };
+            let step: Lane<N> = std::array::from_fn(|k| omega[k] * (gathered[k] - old[k]));
             (std::array::from_fn(|k| old[k] + step[k]), step)
         };
         let of_faces: Vec<Lane<N>> = face_irradiance
@@ -162,10 +177,26 @@ impl<'a, const N: usize> Gather<'a, N> {
                 change
             })
             .collect();
+        self.close_far_field(half, &mut into.radiosity);
         of_faces
             .iter()
             .chain(&of_soil)
             .fold([0.0; N], |sum, c| std::array::from_fn(|b| sum[b] + c[b]))
+    }
+
+    /// The radiosities of the far ends as they follow from those of the faces.
+    fn close_far_field(&self, half: usize, radiosity: &mut [Lane<N>]) {
+        let Some(far) = self.far else { return };
+        let (near, far_ends) = radiosity.split_at_mut(self.world.ends.far_start() as usize);
+        let rows = &far.halves[half];
+        far_ends.par_iter_mut().enumerate().for_each(|(row, out)| {
+            let ends = rows.row(row);
+            // a level that no line passes keeps what it has
+            if !ends.is_empty() {
+                let sum = gather(std::slice::from_ref(rows), near, row);
+                *out = sum.map(|s| s / ends.len() as f64);
+            }
+        });
     }
 
     /// Area that is not buried, times absorptance of a face, m², per band.
@@ -191,15 +222,10 @@ impl<'a, const N: usize> Gather<'a, N> {
     }
 }
 
-/// Mean radiosity of what a row sees, over all its lines: the irradiance that they bring. All
-/// entries weigh the same, so this is a plain mean; what is buried is dark and is not in the weight.
+/// Sum of the radiosities of what a row sees: all lines weigh the same. What is buried is dark, and is
+/// not in the weight.
 #[inline]
-fn gather<const N: usize>(
-    batches: &[BatchRows],
-    seen: &[Lane<N>],
-    row: usize,
-    weight: f64,
-) -> Lane<N> {
+fn gather<const N: usize>(batches: &[BatchRows], seen: &[Lane<N>], row: usize) -> Lane<N> {
     let mut sum = [0.0; N];
     for batch in batches {
         for &end in batch.row(row) {
@@ -209,5 +235,5 @@ fn gather<const N: usize>(
             }
         }
     }
-    sum.map(|s| s * weight)
+    sum
 }

@@ -2,6 +2,7 @@
 //! sorted by depth, and neighbours along it see each other (DESIGN: section 4).
 
 mod fragments;
+mod levels;
 mod sight;
 
 use glam::DVec3;
@@ -26,23 +27,46 @@ pub(crate) fn trace(block: &Block, batch: &v1::Batch) -> Traced {
     }
 }
 
-fn direction(block: &Block, lines: &v1::Lines) -> (u64, Vec<Pair>) {
-    let Some(d) = &lines.direction else {
-        return (0, Vec::new());
+/// What the lines of a batch see, upwards and downwards, from the levels of the far field: (far end,
+/// what it sees), by direction and line.
+pub(crate) fn from_levels(block: &Block, batch: &v1::Batch) -> Vec<Pair> {
+    let of_direction = |lines: &v1::Lines| {
+        let mut looks = Vec::new();
+        if let Some(lattice) = lattice(block, lines).filter(|l| l.lines() > 0) {
+            let levels = levels::Levels::new(block, &lattice);
+            fragments::for_each_line(block, &lattice, |line, hits| {
+                levels.along(line, hits, &mut looks);
+            });
+        }
+        looks
     };
+    batch
+        .lines
+        .par_iter()
+        .map(of_direction)
+        .collect::<Vec<_>>()
+        .concat()
+}
+
+fn lattice(block: &Block, lines: &v1::Lines) -> Option<Lattice> {
+    let d = lines.direction.as_ref()?;
     let random = [lines.random_x, lines.random_y, lines.random_count];
-    let lattice = Lattice::new(
+    Some(Lattice::new(
         DVec3::new(d.x, d.y, d.z),
         &block.extent,
         lines.line_area_m2,
         random,
-    );
+    ))
+}
+
+fn direction(block: &Block, lines: &v1::Lines) -> (u64, Vec<Pair>) {
     let mut pairs = Vec::new();
-    if lattice.lines() > 0 {
-        let sight = sight::Sight::new(block, &lattice);
-        fragments::for_each_line(block, &lattice, |line, hits| {
-            sight.along(line, hits, &mut pairs)
-        });
-    }
+    let Some(lattice) = lattice(block, lines).filter(|l| l.lines() > 0) else {
+        return (0, pairs);
+    };
+    let sight = sight::Sight::new(block, &lattice);
+    fragments::for_each_line(block, &lattice, |line, hits| {
+        sight.along(line, hits, &mut pairs)
+    });
     (lattice.lines() as u64, pairs)
 }

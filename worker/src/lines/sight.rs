@@ -21,7 +21,6 @@ impl<'a> Sight<'a> {
     pub(crate) fn new(block: &'a Block, lattice: &Lattice) -> Self {
         let ends = &block.ends;
         let steps = (block.radius_m / lattice.distance_m(1)).ceil();
-        let cosine = lattice.direction.z;
         Self {
             block,
             soil: block.soil.map(|soil| SoilUnder::new(&soil, lattice)),
@@ -32,7 +31,7 @@ impl<'a> Sight<'a> {
                 ends.void()
             }),
             radius: (steps < f64::from(u32::MAX)).then_some(steps as u32),
-            bin: ((cosine * f64::from(ends.far_bins)) as u32).min(ends.far_bins.saturating_sub(1)),
+            bin: ends.far_bin(lattice.direction.z),
         }
     }
 
@@ -104,7 +103,7 @@ impl<'a> Sight<'a> {
 }
 
 /// The soil cells at the lower ends of the lines.
-struct SoilUnder {
+pub(super) struct SoilUnder {
     depth: u32,
     /// Column and row of cells for each column and row of the lattice; `None` beyond the map.
     column: Vec<Option<u32>>,
@@ -113,7 +112,7 @@ struct SoilUnder {
 }
 
 impl SoilUnder {
-    fn new(soil: &Soil, lattice: &Lattice) -> Self {
+    pub(super) fn new(soil: &Soil, lattice: &Lattice) -> Self {
         let cell = |x: f64, min: f64, size: f64, cells: u32| {
             let k = ((x - min) / size).floor();
             if lattice.periodic {
@@ -135,7 +134,13 @@ impl SoilUnder {
         }
     }
 
-    fn cell(&self, line: usize) -> Option<u32> {
+    /// Of the soil plane, along the lines.
+    pub(super) fn depth(&self) -> u32 {
+        self.depth
+    }
+
+    /// The cell at the lower end of a line.
+    pub(super) fn cell(&self, line: usize) -> Option<u32> {
         let nx = self.column.len();
         Some(self.row[line / nx]? * self.columns + self.column[line % nx]?)
     }

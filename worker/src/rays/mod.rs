@@ -3,7 +3,7 @@
 
 mod tracer;
 
-use glam::DVec3;
+use glam::{DVec2, DVec3};
 use nestrad_common::directions::{Purpose, stream};
 use nestrad_common::elements;
 use nestrad_proto::v1;
@@ -38,6 +38,7 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced
         })
         .collect();
     traced.looks = looks.concat();
+    from_soil(block, tracer, &plan, &mut traced.looks);
     traced.rays = traced.looks.len() as u64;
 }
 
@@ -55,6 +56,15 @@ impl Plan<'_> {
         let batches = self.rays.batches_in_half.max(1);
         let turn = (self.batch % batches + face % batches) % batches;
         missing / batches + u32::from(turn < missing % batches)
+    }
+
+    /// Random numbers of an end, which depend on nothing else.
+    fn numbers(&self, end: u32) -> Pcg64Mcg {
+        stream(
+            self.rays.seed,
+            Purpose::Rays,
+            u64::from(self.batch) << 32 | u64::from(end),
+        )
     }
 }
 
@@ -76,8 +86,7 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
             if count == 0 {
                 continue;
             }
-            let index = u64::from(plan.batch) << 32 | u64::from(global);
-            let mut rng = stream(plan.rays.seed, Purpose::Rays, index);
+            let mut rng = plan.numbers(global);
             let outward = if side == 0 { normal } else { -normal };
             let corners = elements::piece_corners(n, local - block.first[t]);
             for k in 0..count {
@@ -86,10 +95,38 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
                 let ray = FaceRay {
                     origin,
                     direction,
-                    source: t as u32,
+                    source: Some(t as u32),
                 };
                 looks.push((face, tracer.seen(block, &ray, rng.random())));
             }
+        }
+    }
+}
+
+fn from_soil(block: &Block, tracer: &Tracer, plan: &Plan, looks: &mut Vec<Pair>) {
+    let Some(soil) = &block.soil else { return };
+    for cell in 0..block.ends.soil_cells {
+        let end = block.ends.soil(cell);
+        let row = block.local(end);
+        if !block.has_row(row) {
+            continue;
+        }
+        let count = plan.rays_of(soil.cell_m.x * soil.cell_m.y, end);
+        let mut rng = plan.numbers(end);
+        let corner = DVec2::new(
+            f64::from(cell % soil.cells[0]),
+            f64::from(cell / soil.cells[0]),
+        );
+        for k in 0..count {
+            let within = DVec2::new(rng.random(), rng.random());
+            let origin = (soil.min_m + (corner + within) * soil.cell_m).extend(soil.z_m);
+            let direction = cosine_direction(DVec3::Z, (k, count), &mut rng);
+            let ray = FaceRay {
+                origin,
+                direction,
+                source: None,
+            };
+            looks.push((row, tracer.seen(block, &ray, rng.random())));
         }
     }
 }

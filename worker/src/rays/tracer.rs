@@ -171,7 +171,7 @@ impl Tracer {
             .ray_traverse(tree_ray, &mut RayHit::none(), |_, p| {
                 let (t, copy) = self.primitives[p];
                 let away = [pattern[0] + copy[0], pattern[1] + copy[1]];
-                if t == ray.source && away == [0, 0] {
+                if Some(t) == ray.source && away == [0, 0] {
                     return f32::INFINITY;
                 }
                 let Some(hit) = edges.meet(
@@ -202,8 +202,8 @@ pub(crate) struct FaceRay {
     pub(crate) origin: DVec3,
     /// Unit vector.
     pub(crate) direction: DVec3,
-    /// The local triangle that it leaves; it cannot hit it again (but copies of it it can).
-    pub(crate) source: u32,
+    /// The local triangle that it leaves, if it does not leave the soil; it cannot hit it again (but copies of it it can).
+    pub(crate) source: Option<u32>,
 }
 
 /// What is seen when no triangle is hit within reach.
@@ -224,8 +224,7 @@ fn beyond(block: &Block, origin: DVec3, direction: DVec3, soil_t: f64, random: f
     }
     let last = ends.far_levels.saturating_sub(1);
     let level = (((z - bottom) / (top - bottom) * f64::from(last) + random) as u32).min(last);
-    let bin = ((direction.z.abs() * f64::from(ends.far_bins)) as u32)
-        .min(ends.far_bins.saturating_sub(1));
+    let bin = ends.far_bin(direction.z.abs());
     block.local(if direction.z < 0.0 {
         ends.far_from_below(bin, level)
     } else {

@@ -1,0 +1,157 @@
+//! `nestrad check`: what is in a scene and what is wrong with it. Nothing is computed.
+
+use anyhow::Result;
+use clap::Args;
+use nestrad_common::assemble::{self, Loaded};
+use nestrad_common::inputs::Inputs;
+use nestrad_common::inspection::Inspection;
+use nestrad_common::light::sky::directions_for;
+use nestrad_common::optics::FaceOptics;
+use nestrad_common::options::Options;
+use nestrad_common::problem::Problem;
+use nestrad_master::plan::Settings;
+
+use super::console;
+use super::flags::SceneFlags;
+
+/// Say what is in a scene and what is wrong with it; compute nothing
+///
+/// Facts and warnings go to stdout. The exit code is 1 where `solve` would refuse the scene.
+#[derive(Debug, Args)]
+pub(crate) struct CheckArgs {
+    #[command(flatten)]
+    scene: SceneFlags,
+}
+
+impl CheckArgs {
+    pub(crate) fn run(self) -> Result<()> {
+        let inputs = self.scene.inputs(Options::default())?;
+        match load(&inputs) {
+            Ok(loaded) => {
+                let mut facts = Facts::default();
+                facts.geometry(&loaded.inspection);
+                facts.optics(&loaded.problem);
+                facts.light(&loaded.problem);
+                facts.warnings(&loaded.inspection);
+                console::print(facts.0.as_bytes())
+            }
+            Err(error) => {
+                // the geometry may be good even where its optics or its light are not
+                if let Ok(inspection) = assemble::inspect_geometry(&inputs) {
+                    let mut facts = Facts::default();
+                    facts.geometry(&inspection);
+                    facts.warnings(&inspection);
+                    console::print(facts.0.as_bytes())?;
+                }
+                Err(error)
+            }
+        }
+    }
+}
+
+/// As `solve` does it.
+fn load(inputs: &Inputs) -> Result<Loaded> {
+    let mut loaded = assemble::load(inputs)?;
+    if let Some(sky) = &loaded.sky {
+        let default = Settings::default();
+        let accuracy = inputs.options.accuracy_percent;
+        let directions = directions_for(accuracy.unwrap_or(default.accuracy_percent));
+        let seed = inputs.options.seed.unwrap_or(default.seed);
+        loaded.problem.sources = sky.sources(directions, seed)?;
+    }
+    Ok(loaded)
+}
+
+/// Lines of text: a word, and what is to be said of it.
+#[derive(Default)]
+struct Facts(String);
+
+impl Facts {
+    fn line(&mut self, what: &str, text: &str) {
+        self.0.push_str(&format!("{what:<10}{text}\n"));
+    }
+
+    fn geometry(&mut self, facts: &Inspection) {
+        let Inspection {
+            triangles,
+            organs,
+            plants,
+            smallest_m2,
+            largest_m2,
+            ..
+        } = facts;
+        let counts = format!("{triangles} in {organs} organs of {plants} plants");
+        self.line("triangles", &counts);
+        let areas = format!("of {smallest_m2:.2e} to {largest_m2:.2e} m² each");
+        self.line("", &areas);
+        let [low, high] = [facts.lower_m, facts.upper_m];
+        let ranges: Vec<String> = (0..3)
+            // adding zero turns -0 into 0
+            .map(|k| [low[k], high[k]].map(|x| (x * 1e3).round() / 1e3 + 0.0))
+            .zip(["x", "y", "z"])
+            .map(|([low, high], axis)| format!("{axis} {low:.3} to {high:.3} m"))
+            .collect();
+        self.line("extent", &ranges.join(", "));
+        let pattern = match facts.pattern_m {
+            Some([x, y]) => {
+                let overhang_m = facts.overhang_m;
+                format!("{x:.3} m by {y:.3} m; the scene reaches {overhang_m:.3} m beyond it")
+            }
+            None => "none: the scene stands alone".to_owned(),
+        };
+        self.line("pattern", &pattern);
+        let soil = match facts.soil_z_m {
+            Some(z) => format!("a plane at z = {z:.3} m"),
+            None => "no plane: a black void below".to_owned(),
+        };
+        self.line("soil", &soil);
+        if let Some(index) = facts.area_index {
+            let ground = match facts.pattern_m {
+                Some(_) => "ground",
+                None => "the box around the scene",
+            };
+            let index = format!("{index:.3} m², one-sided, without soil, per m² of {ground}");
+            self.line("area", &index);
+        }
+        for material in &facts.materials {
+            let (triangles, area_m2) = (material.triangles, material.area_m2);
+            let text = format!("{}: {triangles} triangles, {area_m2:.4} m²", material.name);
+            self.line("material", &text);
+        }
+    }
+
+    fn optics(&mut self, problem: &Problem) {
+        for band in &problem.bands {
+            let face = |f: FaceOptics| format!("rho {} tau {}", f.rho, f.tau);
+            let mut parts = Vec::new();
+            if problem.scene.soil_z_m.is_some() {
+                parts.push(format!("soil rho {}", band.soil_albedo));
+            }
+            for (material, optics) in problem.scene.materials.iter().zip(&band.materials) {
+                let (upper, lower) = (face(optics.upper), face(optics.lower));
+                parts.push(if upper == lower {
+                    format!("{material} {upper}")
+                } else {
+                    format!("{material} upper {upper}, lower {lower}")
+                });
+            }
+            self.line("band", &format!("{}: {}", band.name, parts.join("; ")));
+        }
+    }
+
+    fn light(&mut self, problem: &Problem) {
+        let sources = &problem.sources;
+        let sum = |band: usize| sources.iter().map(|s| s.irradiance_W_m2[band]).sum::<f64>();
+        let totals = (0..).zip(&problem.bands);
+        let totals = totals.map(|(b, band)| format!("{} {:.2} W m⁻²", band.name, sum(b)));
+        let totals = totals.collect::<Vec<_>>().join(", ");
+        let s = if sources.len() == 1 { "" } else { "s" };
+        self.line("light", &format!("{} source{s}: {totals}", sources.len()));
+    }
+
+    fn warnings(&mut self, facts: &Inspection) {
+        for warning in &facts.warnings {
+            self.line("warning", warning);
+        }
+    }
+}

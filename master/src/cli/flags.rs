@@ -1,0 +1,231 @@
+//! Flags that say what to compute: shared by `solve` and `check`.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use anyhow::Result;
+use clap::error::ErrorKind;
+use clap::{Args, ValueEnum};
+use nestrad_common::assemble;
+use nestrad_common::inputs::{BandInput, Inputs, LightInput, PatternInput};
+use nestrad_common::light::Sky;
+use nestrad_common::options::{Options, Unit};
+
+/// The canopy, its optics and its light. What is said here wins over what a scene file says.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What to compute")]
+pub(crate) struct SceneFlags {
+    /// The canopy: CAN or OBJ files (.can, .obj, plain or .gz), or a scene file (.toml)
+    ///
+    /// A scene file may say all that flags say; flags win over it. Geometry files given
+    /// beside a scene file take the place of those that it names.
+    #[arg(required = true, value_name = "SCENE", help_heading = "Arguments")]
+    scenes: Vec<PathBuf>,
+
+    /// Optical properties of a wavelength band, one .opt file a band; repeat for more bands
+    ///
+    /// NAME is yours, and is found again in the results: --optics PAR=par.opt --optics NIR=nir.opt
+    #[arg(long, value_name = "NAME=FILE", value_parser = named_file)]
+    optics: Vec<(String, PathBuf)>,
+
+    /// Sources of light, from a .light file for all bands, or from one file a band (NAME=FILE)
+    ///
+    /// A line of the file is a parallel source: irradiance of the horizontal (W m-2) and direction of
+    /// travel x y z.
+    #[arg(long, value_name = "FILE|NAME=FILE", value_parser = light_file)]
+    light: Vec<(Option<String>, PathBuf)>,
+
+    /// A built-in sky in place of --light, as bright as --irradiance says
+    #[arg(
+        long,
+        value_enum,
+        value_name = "SKY",
+        conflicts_with = "light",
+        requires = "irradiance"
+    )]
+    sky: Option<SkyKind>,
+
+    /// Irradiance of the horizontal above the canopy in a band, W m-2; once for each band
+    #[arg(long, value_name = "NAME=W_m2", value_parser = named_number, requires = "sky")]
+    irradiance: Vec<(String, f64)>,
+
+    /// Clear sky: date and time in UTC, such as 2024-06-21T10:00:00Z
+    #[arg(
+        long,
+        value_name = "UTC",
+        requires = "sky",
+        required_if_eq("sky", "clear")
+    )]
+    time: Option<String>,
+
+    /// Clear sky: degrees, north positive
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        requires = "sky",
+        required_if_eq("sky", "clear"),
+        allow_negative_numbers = true
+    )]
+    latitude: Option<f64>,
+
+    /// Clear sky: degrees, east positive
+    #[arg(
+        long,
+        value_name = "DEGREES",
+        requires = "sky",
+        required_if_eq("sky", "clear"),
+        allow_negative_numbers = true
+    )]
+    longitude: Option<f64>,
+
+    /// Clear sky: the part of the irradiance that does not come straight from the sun, 0 to 1
+    #[arg(
+        long,
+        value_name = "PART",
+        requires = "sky",
+        required_if_eq("sky", "clear")
+    )]
+    diffuse_fraction: Option<f64>,
+
+    /// The rectangle on which the canopy repeats for ever, a .8 file [default: the canopy stands alone]
+    #[arg(long, value_name = "FILE")]
+    pattern: Option<PathBuf>,
+
+    /// Height of a horizontal soil plane, in --unit [default: no soil, a black void below]
+    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    soil: Option<f64>,
+
+    /// Unit of length of geometry, pattern and --soil: m, cm or mm; results are in m [default: m]
+    #[arg(long)]
+    unit: Option<Unit>,
+}
+
+/// A built-in sky.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SkyKind {
+    /// The same radiance from everywhere
+    UniformOvercast,
+    /// Moon and Spencer: the zenith three times as bright as the horizon
+    StandardOvercast,
+    /// CIE clear sky and the sun, at --time, --latitude and --longitude
+    Clear,
+}
+
+impl SceneFlags {
+    /// Flags over the scene file, if there is one.
+    pub(crate) fn inputs(self, options: Options) -> Result<Inputs> {
+        let is_toml = |path: &PathBuf| path.extension().is_some_and(|e| e == "toml");
+        let (files, scenes): (Vec<_>, Vec<_>) = self.scenes.iter().cloned().partition(is_toml);
+        let file = match &files[..] {
+            [] => Inputs::default(),
+            [file] => assemble::load_scene_file(file)?,
+            _ => return Err(misuse("expected one scene file (.toml), found more")),
+        };
+        let bands = self.optics.iter().map(|(name, path)| BandInput {
+            name: name.clone(),
+            optics: Some(path.clone()),
+            ..BandInput::default()
+        });
+        let flags = Inputs {
+            scenes,
+            unit: self.unit,
+            pattern: self.pattern.clone().map(PatternInput::File),
+            soil: self.soil,
+            bands: bands.collect(),
+            light: self.light()?,
+            options,
+        };
+        Ok(flags.over(file))
+    }
+
+    fn light(self) -> Result<Option<LightInput>> {
+        if let Some(kind) = self.sky {
+            let irradiance_W_m2 = once("--irradiance", self.irradiance.clone())?;
+            return Ok(Some(LightInput::Sky {
+                sky: self.sky(kind)?,
+                irradiance_W_m2,
+            }));
+        }
+        match &self.light[..] {
+            [] => Ok(None),
+            [(None, file)] => Ok(Some(LightInput::File(file.clone()))),
+            several => {
+                let named = several
+                    .iter()
+                    .map(|(name, file)| name.clone().map(|name| (name, file.clone())));
+                let named: Option<Vec<_>> = named.collect();
+                let expected = "--light: expected one FILE, or NAME=FILE for each band";
+                let named = named.ok_or_else(|| misuse(expected))?;
+                Ok(Some(LightInput::Files(once("--light", named)?)))
+            }
+        }
+    }
+
+    fn sky(self, kind: SkyKind) -> Result<Sky> {
+        let given = (
+            self.time,
+            self.latitude,
+            self.longitude,
+            self.diffuse_fraction,
+        );
+        match (kind, given) {
+            (SkyKind::UniformOvercast, (None, None, None, None)) => Ok(Sky::UniformOvercast),
+            (SkyKind::StandardOvercast, (None, None, None, None)) => Ok(Sky::StandardOvercast),
+            (SkyKind::Clear, (Some(time_utc), Some(latitude), Some(longitude), Some(diffuse))) => {
+                Ok(Sky::Clear {
+                    time_utc,
+                    latitude_deg: latitude,
+                    longitude_deg: longitude,
+                    diffuse_fraction: diffuse,
+                })
+            }
+            // that a clear sky has all of them is checked by the parser
+            _ => Err(misuse(
+                "--time, --latitude, --longitude and --diffuse-fraction are for --sky clear",
+            )),
+        }
+    }
+}
+
+/// A call that makes no sense, found after parsing.
+fn misuse(message: &str) -> anyhow::Error {
+    clap::Error::raw(ErrorKind::ArgumentConflict, format!("{message}\n")).into()
+}
+
+/// Values by name; a name that comes twice is an error.
+fn once<T>(flag: &str, named: Vec<(String, T)>) -> Result<BTreeMap<String, T>> {
+    let mut values = BTreeMap::new();
+    for (name, value) in named {
+        if values.contains_key(&name) {
+            return Err(misuse(&format!("{flag}: band {name} is given twice")));
+        }
+        values.insert(name, value);
+    }
+    Ok(values)
+}
+
+fn named(text: &str) -> Option<(String, &str)> {
+    let (name, value) = text.split_once('=')?;
+    (!name.is_empty() && !value.is_empty()).then(|| (name.to_owned(), value))
+}
+
+fn named_file(text: &str) -> Result<(String, PathBuf), String> {
+    let (name, file) = named(text).ok_or("expected NAME=FILE")?;
+    Ok((name, file.into()))
+}
+
+/// `./a=b.light` is a file: names of bands hold no slash here.
+fn light_file(text: &str) -> Result<(Option<String>, PathBuf), String> {
+    match named(text) {
+        Some((name, file)) if !name.contains('/') => Ok((Some(name), file.into())),
+        _ => Ok((None, text.into())),
+    }
+}
+
+fn named_number(text: &str) -> Result<(String, f64), String> {
+    let (name, number) = named(text).ok_or("expected NAME=NUMBER")?;
+    match number.parse() {
+        Ok(number) => Ok((name, number)),
+        Err(_) => Err(format!("expected a number, found {number}")),
+    }
+}

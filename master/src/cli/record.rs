@@ -1,0 +1,111 @@
+//! The options of a run as its summary keeps them, defaults included.
+
+use nestrad_common::inputs::{Inputs, LightInput, PatternInput};
+use nestrad_common::light::Sky;
+use nestrad_common::options::{Diameter, TableFormat, Unit};
+use nestrad_master::plan::{Estimator, Settings};
+use serde::Serialize;
+
+/// What was asked for. Files are as the user named them.
+#[derive(Debug, Serialize)]
+pub(crate) struct Record {
+    scenes: Vec<String>,
+    unit: Unit,
+    pattern: Option<String>,
+    /// In `unit`.
+    soil: Option<f64>,
+    bands: Vec<BandRecord>,
+    light: String,
+    sources: usize,
+    diameter: Diameter,
+    accuracy_percent: f64,
+    memory_GiB: f64,
+    threads: usize,
+    seed: u64,
+    estimator: Estimator,
+    format: TableFormat,
+    vtp: bool,
+}
+
+#[derive(Debug, Serialize)]
+struct BandRecord {
+    name: String,
+    optics: Option<String>,
+}
+
+impl Record {
+    /// To be called where the work is done: it counts the threads there.
+    pub(crate) fn new(inputs: &Inputs, settings: &Settings, sources: usize) -> Self {
+        let options = &inputs.options;
+        Self {
+            scenes: inputs
+                .scenes
+                .iter()
+                .map(|p| p.display().to_string())
+                .collect(),
+            unit: inputs.unit.unwrap_or_default(),
+            pattern: inputs.pattern.as_ref().map(|pattern| match pattern {
+                PatternInput::File(path) => path.display().to_string(),
+                PatternInput::Corners(corners) => corners.map(|c| c.to_string()).join(" "),
+            }),
+            soil: inputs.soil,
+            bands: inputs
+                .bands
+                .iter()
+                .map(|band| BandRecord {
+                    name: band.name.clone(),
+                    optics: band.optics.as_ref().map(|path| path.display().to_string()),
+                })
+                .collect(),
+            light: inputs.light.as_ref().map(light).unwrap_or_default(),
+            sources,
+            diameter: settings.diameter,
+            accuracy_percent: settings.accuracy_percent,
+            memory_GiB: settings.memory_GiB,
+            threads: rayon::current_num_threads(),
+            seed: settings.seed,
+            estimator: settings.estimator,
+            format: options.format.unwrap_or_default(),
+            vtp: options.vtp.unwrap_or(false),
+        }
+    }
+}
+
+/// The light in words.
+pub(crate) fn light(light: &LightInput) -> String {
+    match light {
+        LightInput::File(path) => path.display().to_string(),
+        LightInput::Files(files) => {
+            let named = files
+                .iter()
+                .map(|(band, path)| format!("{band}={}", path.display()));
+            named.collect::<Vec<_>>().join(", ")
+        }
+        LightInput::Sky {
+            sky,
+            irradiance_W_m2,
+        } => {
+            let irradiances = irradiance_W_m2
+                .iter()
+                .map(|(band, value)| format!("{band} {value} W m-2"));
+            let irradiances = irradiances.collect::<Vec<_>>().join(", ");
+            format!("{}; {irradiances}", self::sky(sky))
+        }
+    }
+}
+
+fn sky(sky: &Sky) -> String {
+    match sky {
+        Sky::UniformOvercast => "uniform overcast sky".to_owned(),
+        Sky::StandardOvercast => "standard overcast sky".to_owned(),
+        Sky::Clear {
+            time_utc,
+            latitude_deg,
+            longitude_deg,
+            diffuse_fraction,
+        } => format!(
+            "clear sky at {time_utc}, latitude {latitude_deg}, longitude {longitude_deg}, \
+             diffuse fraction {diffuse_fraction}"
+        ),
+    }
+}

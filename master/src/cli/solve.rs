@@ -1,0 +1,240 @@
+//! `nestrad solve`: files in, light per leaf out.
+
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::builder::RangedU64ValueParser;
+use clap::{Args, ValueEnum};
+use nestrad_common::assemble::{self, Loaded};
+use nestrad_common::inputs::Inputs;
+use nestrad_common::light::sky::directions_for;
+use nestrad_common::options::{self, Diameter, Options};
+use nestrad_common::problem::Problem;
+use nestrad_master::output::progress::Progress;
+use nestrad_master::output::resources::Stopwatch;
+use nestrad_master::output::summary::Summary;
+use nestrad_master::output::{self, Formats, TableFormat, terminal};
+use nestrad_master::plan::{Estimator, Plan, Settings};
+use nestrad_master::run::{self, Finished};
+use rayon::ThreadPoolBuilder;
+
+use super::console::{self, Notes};
+use super::flags::SceneFlags;
+use super::record::Record;
+
+/// Compute the light that every organ, triangle and soil cell of a canopy gets
+///
+/// DIR gets organs.csv, triangles.csv, soil.csv (where there is a soil plane) and summary.json, or
+/// stays as it is if anything fails. The plan goes to stderr, a table of the energy balance to stdout.
+#[derive(Debug, Args)]
+pub(crate) struct SolveArgs {
+    #[command(flatten)]
+    scene: SceneFlags,
+
+    #[command(flatten)]
+    how: HowFlags,
+
+    #[command(flatten)]
+    results: ResultFlags,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "How to compute it")]
+struct HowFlags {
+    /// Diameter of the sphere around a leaf in which light is exchanged on the true geometry:
+    /// auto, inf or metres [default: auto]
+    ///
+    /// Beyond it, a multilayer model of the canopy stands in. `inf` needs no model; `auto` is `inf`
+    /// where that fits --memory. Always in metres.
+    #[arg(long, value_name = "auto|inf|METRES")]
+    diameter: Option<Diameter>,
+
+    /// Standard error to aim at, percent: rms over organs, relative to the canopy's mean [default: 0.5]
+    ///
+    /// It sets how many lines are traced, and how many directions a built-in sky has (46 at 0.5 %,
+    /// in inverse proportion, 16 to 1000).
+    #[arg(long, value_name = "PERCENT", value_parser = positive)]
+    accuracy: Option<f64>,
+
+    /// Memory that the solve may take, GiB [default: 8]
+    #[arg(long, value_name = "GIB", value_parser = positive)]
+    memory: Option<f64>,
+
+    /// Threads to compute with, 0 for one per processor; results do not depend on it [default: 0]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(0..=4096))]
+    threads: Option<usize>,
+
+    /// Start of all random numbers; the same seed gives the same results to the last bit [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// How light between leaves is sampled
+    #[arg(long, value_enum, value_name = "HOW", default_value_t = EstimatorFlag::Lines)]
+    estimator: EstimatorFlag,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Results")]
+struct ResultFlags {
+    /// Folder for the results; made if there is none. Files of an earlier result are replaced
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+
+    /// Form of the result tables: csv or parquet [default: csv]
+    #[arg(long, value_name = "FORM")]
+    format: Option<options::TableFormat>,
+
+    /// Write canopy.vtp too: the triangles with their light, for ParaView
+    #[arg(long)]
+    vtp: bool,
+
+    /// Say nothing but errors: no plan, no progress, no table
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum EstimatorFlag {
+    /// Parallel lines through the canopy, completed with rays where they are thin
+    Lines,
+    /// Rays from every face: slower, and independent of the lines
+    Rays,
+}
+
+impl SolveArgs {
+    fn options(&self) -> Options {
+        let Self { how, results, .. } = self;
+        Options {
+            diameter: how.diameter,
+            accuracy_percent: how.accuracy,
+            memory_GiB: how.memory,
+            threads: how.threads,
+            seed: how.seed,
+            format: results.format,
+            vtp: results.vtp.then_some(true),
+        }
+    }
+
+    pub(crate) fn run(self) -> Result<()> {
+        let options = self.options();
+        let inputs = self.scene.inputs(options)?;
+        let task = Task {
+            settings: settings(&inputs.options, self.how.estimator),
+            notes: Notes {
+                quiet: self.results.quiet,
+            },
+            inputs,
+            out: self.results.out,
+        };
+        let threads = task.inputs.options.threads.unwrap_or(0);
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.context("cannot start threads")?
+            .install(|| task.solve())
+    }
+}
+
+fn settings(options: &Options, estimator: EstimatorFlag) -> Settings {
+    let default = Settings::default();
+    Settings {
+        diameter: options.diameter.unwrap_or(default.diameter),
+        accuracy_percent: options.accuracy_percent.unwrap_or(default.accuracy_percent),
+        memory_GiB: options.memory_GiB.unwrap_or(default.memory_GiB),
+        seed: options.seed.unwrap_or(default.seed),
+        estimator: match estimator {
+            EstimatorFlag::Lines => Estimator::Lines,
+            EstimatorFlag::Rays => Estimator::Rays,
+        },
+    }
+}
+
+/// All that the user said.
+struct Task {
+    inputs: Inputs,
+    settings: Settings,
+    out: PathBuf,
+    notes: Notes,
+}
+
+impl Task {
+    fn solve(&self) -> Result<()> {
+        let mut watch = Stopwatch::start();
+        let loaded = self.load()?;
+        // before the work, not after it
+        output::check_writable(&self.out)?;
+        watch.lap("input");
+
+        let plan = Plan::new(&loaded.problem, &self.settings)?;
+        for line in &plan.reasons {
+            self.notes.say("plan", line);
+        }
+        let progress = Progress::new(self.notes.quiet);
+        let finished = run::solve(&loaded.problem, &plan, &progress, &mut watch)?;
+        self.write(&loaded, &plan, &finished, watch)
+    }
+
+    /// The problem, with a sky turned into sources.
+    fn load(&self) -> Result<Loaded> {
+        let mut loaded = assemble::load(&self.inputs)?;
+        for warning in &loaded.inspection.warnings {
+            self.notes.say("warning", warning);
+        }
+        if let Some(sky) = &loaded.sky {
+            let directions: NonZeroUsize = directions_for(self.settings.accuracy_percent);
+            loaded.problem.sources = sky.sources(directions, self.settings.seed)?;
+        }
+        Ok(loaded)
+    }
+
+    fn write(
+        &self,
+        loaded: &Loaded,
+        plan: &Plan,
+        finished: &Finished,
+        mut watch: Stopwatch,
+    ) -> Result<()> {
+        let Problem { scene, bands, .. } = &loaded.problem;
+        let names: Vec<&str> = bands.iter().map(|band| band.name.as_str()).collect();
+        let solution = &finished.solution;
+        let staged = output::stage(&self.out, scene, &names, solution, self.formats())?;
+        watch.lap("output");
+        let usage = watch.usage();
+        staged.commit(&Summary {
+            version: env!("CARGO_PKG_VERSION"),
+            options: &Record::new(&self.inputs, &self.settings, loaded.problem.sources.len()),
+            scene: &loaded.inspection,
+            plan,
+            energy_balance: &solution.balance,
+            error_estimates: &output::errors::organ_errors(scene, solution),
+            counters: &finished.counters,
+            stages: watch.stages(),
+            resources: usage,
+        })?;
+        if self.notes.quiet {
+            return Ok(());
+        }
+        let mut table = Vec::new();
+        terminal::write(&mut table, scene, solution, usage)?;
+        console::print(&table)?;
+        let place = self.out.display();
+        self.notes.say("done", &format!("results are in {place}"));
+        Ok(())
+    }
+
+    fn formats(&self) -> Formats {
+        let options = &self.inputs.options;
+        Formats {
+            table: match options.format.unwrap_or_default() {
+                options::TableFormat::Csv => TableFormat::Csv,
+                options::TableFormat::Parquet => TableFormat::Parquet,
+            },
+            vtp: options.vtp.unwrap_or(false),
+        }
+    }
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|value: &f64| value.is_finite() && *value > 0.0);
+    number.ok_or_else(|| "expected a number above 0".to_owned())
+}

@@ -1,0 +1,23 @@
+//! `nestrad`: light in plant canopies, from the command line.
+
+#![allow(
+    non_snake_case,
+    reason = "units in names are written as units: irradiance_W_m2"
+)]
+
+mod cli;
+
+use std::process::ExitCode;
+
+use clap::Parser;
+
+use cli::{Cli, Command};
+
+fn main() -> ExitCode {
+    let outcome = match Cli::parse().command {
+        Command::Solve(args) => args.run(),
+        Command::Check(args) => args.run(),
+        Command::Generate(args) => args.run(),
+    };
+    cli::exit_code(outcome)
+}

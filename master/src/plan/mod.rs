@@ -1,0 +1,237 @@
+//! The plan: what a scene needs, decided before anything is computed. What is not needed costs
+//! nothing.
+
+mod memory;
+mod reasons;
+mod scale;
+
+use nestrad_common::directions::Axes;
+use nestrad_common::options::Diameter;
+use nestrad_common::problem::Problem;
+use serde::Serialize;
+use thiserror::Error;
+
+use crate::direct;
+use crate::exchange::Sampling;
+use crate::far_field::closure::Resolution;
+use crate::solver::{HALF_BATCHES, Tolerance};
+use crate::world::World;
+pub use memory::Memory;
+pub use scale::Scale;
+
+/// What the user asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Settings {
+    /// Diameter of the sphere of near exchange.
+    pub diameter: Diameter,
+    /// Standard error to aim at: rms over organs, in percent of the mean absorbed power per area.
+    pub accuracy_percent: f64,
+    /// Memory that the solve may take, GiB.
+    pub memory_GiB: f64,
+    /// Start of all random numbers.
+    pub seed: u64,
+    /// How the exchange is sampled.
+    pub estimator: Estimator,
+}
+
+/// How the exchange is sampled.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+pub enum Estimator {
+    /// Parallel lines, completed with rays where they are thin.
+    #[default]
+    Lines,
+    /// Rays from every face: slower, and independent of the lines.
+    Rays,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            diameter: Diameter::Auto,
+            accuracy_percent: DEFAULT_ACCURACY_PERCENT,
+            memory_GiB: 8.0,
+            seed: 1,
+            estimator: Estimator::default(),
+        }
+    }
+}
+
+/// The accuracy that the constants of the plan were measured at.
+pub const DEFAULT_ACCURACY_PERCENT: f64 = 0.5;
+
+/// What will be done, and why.
+#[derive(Clone, Debug, Serialize)]
+pub struct Plan {
+    /// The scene's sizes.
+    pub scale: Scale,
+    /// Longest edge of an element, metres.
+    pub max_edge_m: f64,
+    /// Side of a soil cell, metres, about.
+    pub soil_cell_m: f64,
+    /// Radius of the sphere of near exchange, metres; `None` for plain radiosity.
+    pub radius_m: Option<f64>,
+    /// The far field; `None` where nothing is far.
+    pub far_field: Option<Resolution>,
+    /// Sampling of the exchange; `None` when nothing scatters.
+    pub sampling: Option<Sampling>,
+    /// Cross-section of a line of the strongest source, m².
+    pub direct_line_area_m2: f64,
+    /// Start of the random numbers of the direct light.
+    pub seed: u64,
+    /// Numbers of the bands in which something scatters.
+    pub scattering_bands: Vec<usize>,
+    /// When the solver stops.
+    pub tolerance: Tolerance,
+    /// Memory that it will take.
+    pub memory: Memory,
+    /// One line each: what, and the reason.
+    pub reasons: Vec<String>,
+}
+
+/// Why no plan can be made.
+#[derive(Clone, Debug, Error, PartialEq)]
+pub enum PlanError {
+    /// It does not fit.
+    #[error(
+        "the solve needs about {needed_GiB:.2} GiB, the limit is {limit_GiB} GiB: raise --memory or --accuracy"
+    )]
+    Memory {
+        /// What the smallest plan for this accuracy takes.
+        needed_GiB: f64,
+        /// What the user allows.
+        limit_GiB: f64,
+    },
+}
+
+impl Plan {
+    /// Decides what a problem needs.
+    pub fn new(problem: &Problem, settings: &Settings) -> Result<Self, PlanError> {
+        let scale = Scale::of(problem);
+        let has_soil = problem.scene.soil_z_m.is_some();
+        let lit = |b: usize| problem.sources.iter().any(|s| s.irradiance_W_m2[b] > 0.0);
+        let scattering_bands: Vec<usize> = (0..problem.bands.len())
+            .filter(|&b| lit(b) && !problem.bands[b].is_black(has_soil))
+            .collect();
+        let sampling = (!scattering_bands.is_empty()).then(|| sampling(&scale, settings));
+        // an open scene has no layers that go on for ever; its exchange is full
+        let radius_m = match settings.diameter {
+            Diameter::Metres(d) if problem.scene.pattern.is_some() => Some(0.5 * d),
+            Diameter::Metres(_) | Diameter::Auto | Diameter::Infinite => None,
+        };
+        // a sphere longer than every line of sight is no bound
+        let radius_m =
+            radius_m.filter(|&r| sampling.is_some_and(|s| r < s.longest_sight_m(scale.height_m)));
+        let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
+        let max_edge_m = (scale.organ_area_m2.sqrt() / 4.0)
+            .min((scale.ground_area_m2 / 1000.0).sqrt())
+            .max(f64::MIN_POSITIVE)
+            .min(radius_m.unwrap_or(f64::INFINITY))
+            * finer.sqrt().clamp(0.2, 1.0);
+        let soil_cell_m = (0.2 * scale.organ_area_m2.sqrt()).clamp(
+            (scale.ground_area_m2 / MOST_SOIL_CELLS).sqrt(),
+            (scale.ground_area_m2 / LEAST_SOIL_CELLS)
+                .sqrt()
+                .max(f64::MIN_POSITIVE),
+        );
+        // points on the outline of an organ: see `spread_effort`
+        let direct_line_area_m2 = (scale.organ_area_m2 / 11_000.0 * finer.powf(4.0 / 3.0))
+            .min(scale.triangle_area_m2 / 4.0)
+            .clamp(
+                scale.ground_area_m2 / MOST_DIRECT_LINES,
+                scale.ground_area_m2 / 1e4,
+            )
+            .max(f64::MIN_POSITIVE);
+        let mut plan = Self {
+            scale,
+            max_edge_m,
+            soil_cell_m,
+            radius_m,
+            far_field: radius_m.map(|_| far_field(settings)),
+            sampling,
+            direct_line_area_m2,
+            seed: settings.seed,
+            scattering_bands,
+            tolerance: Tolerance {
+                absorbed: (1e-4 * finer).clamp(1e-9, 1e-3),
+                most_passes: 500,
+            },
+            memory: Memory::default(),
+            reasons: Vec::new(),
+        };
+        plan.memory = Memory::of(problem, &plan);
+        let needed_GiB = plan.memory.total_GiB();
+        if needed_GiB > settings.memory_GiB {
+            return Err(PlanError::Memory {
+                needed_GiB,
+                limit_GiB: settings.memory_GiB,
+            });
+        }
+        plan.reasons = reasons::of(problem, settings, &plan);
+        Ok(plan)
+    }
+
+    /// The world that this plan works in.
+    pub fn world(&self, problem: &Problem) -> World {
+        World::new(
+            &problem.scene,
+            self.max_edge_m,
+            self.soil_cell_m,
+            self.radius_m.unwrap_or(f64::INFINITY),
+            self.far_field.map_or((0, 0), |f| (f.levels, f.bins)),
+        )
+    }
+
+    /// Cross-sections of the lines of each source, m².
+    pub fn direct_line_areas_m2(&self, problem: &Problem) -> Vec<f64> {
+        direct::spread_effort(problem, self.direct_line_area_m2)
+    }
+}
+
+/// Soil cells, at most and at least.
+const MOST_SOIL_CELLS: f64 = 1e6;
+const LEAST_SOIL_CELLS: f64 = 64.0;
+
+/// Lattice points of the strongest source, at most.
+const MOST_DIRECT_LINES: f64 = 3e8;
+
+/// How the exchange is sampled for an accuracy.
+///
+/// The error of an organ falls with the root of the number of directions; lines beyond some 75 per
+/// organ and direction hardly help (both measured: see `master/docs/accuracy.md`). 16 batches of 2
+/// sets of 16 axes give 0.3 to 0.45 % in NIR.
+fn sampling(scale: &Scale, settings: &Settings) -> Sampling {
+    let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
+    let (sets_per_batch, least_samples) = match settings.estimator {
+        Estimator::Lines => (
+            (2.0 / (finer * finer)).round().clamp(1.0, 4096.0) as u32,
+            4.0,
+        ),
+        Estimator::Rays => (0, (RAYS / (finer * finer)).round().clamp(8.0, 1e6)),
+    };
+    Sampling {
+        batches: 2 * HALF_BATCHES as u32,
+        axes: Axes::Both,
+        sets_per_batch,
+        line_area_m2: (scale.organ_area_m2 / 150.0)
+            .min(4.5 * scale.triangle_area_m2)
+            .min(scale.ground_area_m2 / 1000.0)
+            .max(f64::MIN_POSITIVE),
+        least_samples,
+        seed: settings.seed,
+    }
+}
+
+/// Rays from each face in each half, at the default accuracy.
+const RAYS: f64 = 64.0;
+
+fn far_field(settings: &Settings) -> Resolution {
+    let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
+    let more = 1.0 / (finer * finer);
+    Resolution {
+        levels: 65,
+        bins: 6,
+        sets: (2.0 * more).round().clamp(1.0, 64.0) as u32,
+        lines: (24_000.0 * more).clamp(1e4, 1e6) as u32,
+        seed: settings.seed,
+    }
+}

@@ -1,0 +1,124 @@
+//! The plan in words, one line each, with the reason.
+
+use nestrad_common::options::Diameter;
+use nestrad_common::problem::Problem;
+
+use super::{Estimator, Plan, Settings};
+use crate::world::is_soil;
+
+/// Says what a plan does and why.
+pub(super) fn of(problem: &Problem, settings: &Settings, plan: &Plan) -> Vec<String> {
+    let mut lines = vec![light(problem, plan), bands(problem, plan)];
+    lines.push(exchange(settings, plan));
+    lines.push(field(problem, settings, plan));
+    lines.push(faces(problem));
+    lines.push(soil(problem, plan));
+    lines.push(format!(
+        "memory: about {:.2} GiB (scene {:.2}, rows {:.2}, solver {:.2}) of {} GiB allowed",
+        plan.memory.total_GiB(),
+        plan.memory.scene_GiB,
+        plan.memory.rows_GiB,
+        plan.memory.solver_GiB,
+        settings.memory_GiB
+    ));
+    lines
+}
+
+fn light(problem: &Problem, plan: &Plan) -> String {
+    let pitch_mm = 1e3 * plan.direct_line_area_m2.sqrt();
+    match problem.sources.len() {
+        0 => "light: none, so nothing is lit".to_owned(),
+        n => {
+            format!("light: {n} parallel sources, projected at {pitch_mm:.2} mm for the strongest")
+        }
+    }
+}
+
+fn bands(problem: &Problem, plan: &Plan) -> String {
+    let names = |scatters: bool| -> Vec<&str> {
+        (0..problem.bands.len())
+            .filter(|b| plan.scattering_bands.contains(b) == scatters)
+            .map(|b| problem.bands[b].name.as_str())
+            .collect()
+    };
+    let list = |names: Vec<&str>| {
+        if names.is_empty() {
+            "none".to_owned()
+        } else {
+            names.join(", ")
+        }
+    };
+    format!(
+        "bands: {} scatter; {} black or unlit, so direct light only",
+        list(names(true)),
+        list(names(false))
+    )
+}
+
+fn exchange(settings: &Settings, plan: &Plan) -> String {
+    let Some(s) = &plan.sampling else {
+        return "exchange: none, because nothing scatters".to_owned();
+    };
+    match settings.estimator {
+        Estimator::Lines => format!(
+            "exchange: {} directions of lines {:.1} mm apart, for an accuracy of {} %",
+            s.batches * s.sets_per_batch * s.axes.count(),
+            1e3 * s.line_area_m2.sqrt(),
+            settings.accuracy_percent
+        ),
+        Estimator::Rays => format!(
+            "exchange: {} rays from every face, as asked",
+            2.0 * s.least_samples
+        ),
+    }
+}
+
+fn field(problem: &Problem, settings: &Settings, plan: &Plan) -> String {
+    match (plan.radius_m, plan.far_field, settings.diameter) {
+        (Some(r), Some(f), _) => format!(
+            "near field: within {r} m; beyond it {} levels x {} bins per hemisphere, closed on the solution",
+            f.levels, f.bins
+        ),
+        (_, _, Diameter::Metres(_))
+            if plan.sampling.is_some() && problem.scene.pattern.is_none() =>
+        {
+            "near field: full; no far field, because the scene does not repeat".to_owned()
+        }
+        (_, _, Diameter::Metres(d)) if plan.sampling.is_some() => {
+            format!(
+                "near field: full; no far field, because no line of sight is longer than {} m",
+                0.5 * d
+            )
+        }
+        _ if plan.sampling.is_some() => {
+            "near field: full; no far field, because the rows fit the memory".to_owned()
+        }
+        _ => "near field: none; far field: none".to_owned(),
+    }
+}
+
+fn faces(problem: &Problem) -> String {
+    use nestrad_common::scene::Material;
+    let solid = problem
+        .scene
+        .material
+        .iter()
+        .filter(|&&m| matches!(problem.scene.materials[m as usize], Material::Stem { .. }))
+        .count();
+    format!(
+        "faces: two for {} triangles, one for {solid} on the surface of something solid",
+        problem.scene.triangles.len() - solid
+    )
+}
+
+fn soil(problem: &Problem, plan: &Plan) -> String {
+    let triangles = is_soil(&problem.scene).into_iter().filter(|&s| s).count();
+    let plane = match problem.scene.soil_z_m {
+        Some(_) => format!(
+            "a plane in cells of about {:.1} cm",
+            100.0 * plan.soil_cell_m
+        ),
+        None => "no plane: black below".to_owned(),
+    };
+    format!("soil: {plane}; {triangles} triangles")
+}

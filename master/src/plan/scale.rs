@@ -1,0 +1,58 @@
+//! The sizes in a scene that sampling follows.
+
+use nestrad_common::geometry;
+use nestrad_common::problem::Problem;
+use serde::Serialize;
+
+use crate::world::is_soil;
+
+/// Lengths and areas that stand for a scene.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Scale {
+    /// One-sided area of all triangles, m².
+    pub area_m2: f64,
+    /// Area of the ground: the pattern, or the box around an open scene, m².
+    pub ground_area_m2: f64,
+    /// From the lowest to the highest point, soil included, m.
+    pub height_m: f64,
+    /// Area of the organ that a point of the canopy belongs to, on average, m².
+    pub organ_area_m2: f64,
+    /// Area of the triangle that a point of the canopy belongs to, on average, m².
+    pub triangle_area_m2: f64,
+}
+
+impl Scale {
+    /// Measures a scene; soil triangles count only where there is nothing else.
+    pub fn of(problem: &Problem) -> Self {
+        let scene = &problem.scene;
+        let soil = is_soil(scene);
+        let only_soil = soil.iter().all(|&s| s);
+        let (mut area, mut triangle_squares) = (0.0, 0.0);
+        let mut organs = vec![0.0; scene.organs.len()];
+        for (t, triangle) in scene.triangles.iter().enumerate() {
+            if only_soil || !soil[t] {
+                let a = geometry::area(triangle);
+                area += a;
+                triangle_squares += a * a;
+                organs[scene.organ[t] as usize] += a;
+            }
+        }
+        let (mut lo, mut hi) =
+            geometry::bounds(scene.triangles.iter().flatten()).unwrap_or_default();
+        if let Some(z) = scene.soil_z_m {
+            (lo.z, hi.z) = (lo.z.min(z), hi.z.max(z));
+        }
+        let size = hi - lo;
+        let mean = |squares: f64| if area > 0.0 { squares / area } else { 0.0 };
+        Self {
+            area_m2: area,
+            // a scene that stands on edge still has an extent
+            ground_area_m2: scene
+                .pattern
+                .map_or((size.x * size.y).max(area * 1e-3), |p| p.area_m2()),
+            height_m: size.z,
+            organ_area_m2: mean(organs.iter().map(|a| a * a).sum()),
+            triangle_area_m2: mean(triangle_squares),
+        }
+    }
+}
