@@ -5,16 +5,16 @@
 use glam::{DVec2, DVec3};
 use nestrad_common::problem::Problem;
 use nestrad_master::direct::direct_light;
-use nestrad_master::plan::{Plan, Settings};
+use nestrad_master::plan::Settings;
 use nestrad_tests::enclosure::full_plate;
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::solve;
+use nestrad_tests::solving::{plan, solve};
 use nestrad_tests::statistics::{assert_close, assert_within, mean_and_deviation};
 
 /// What organs absorb of direct light, by lattices of lines of that pitch: mean over 16 seeds and its
 /// standard error, W.
 fn absorbed(problem: &Problem, pitch_m: f64) -> Vec<(f64, f64)> {
-    let world = Plan::new(problem, &Settings::default()).world(problem);
+    let world = plan(problem, &Settings::default()).world(problem);
     let areas = vec![pitch_m * pitch_m; problem.sources.len()];
     let runs: Vec<Vec<f64>> = (1..=16)
         .map(|seed| {

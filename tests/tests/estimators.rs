@@ -6,12 +6,12 @@
 
 use nestrad_common::generate::{LeafAngles, LeafShape, RandomCanopy};
 use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Estimator, Plan, Settings};
+use nestrad_master::plan::{Estimator, Settings};
 use nestrad_master::run::Finished;
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
 use nestrad_tests::form_factor::Traced;
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{by, finish, sampling, shares};
+use nestrad_tests::solving::{by, finish, plan, sampling, shares};
 use nestrad_tests::statistics::{mean_and_deviation, median};
 
 fn lit(problem: Problem) -> Problem {
@@ -43,7 +43,7 @@ fn discs() -> Problem {
 }
 
 fn solved(problem: &Problem, estimator: Estimator, rays: f64) -> Finished {
-    let mut plan = Plan::new(problem, &by(estimator));
+    let mut plan = plan(problem, &by(estimator));
     if let (Estimator::Rays, Some(sampling)) = (estimator, &mut plan.sampling) {
         sampling.least_samples = rays;
     }
@@ -150,7 +150,7 @@ fn stated_errors_are_true() {
                 seed,
                 ..Settings::default()
             };
-            finish(&problem, &Plan::new(&problem, &settings)).unwrap()
+            finish(&problem, &plan(&problem, &settings)).unwrap()
         })
         .collect();
     for b in 0..bands {

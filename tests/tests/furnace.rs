@@ -7,7 +7,7 @@
 use glam::{DVec2, DVec3};
 use nestrad_common::ends::Side;
 use nestrad_common::optics::{FaceOptics, LeafOptics};
-use nestrad_master::solver::{self, Tolerance};
+use nestrad_master::solver::{System, Tolerance};
 use nestrad_tests::enclosure::{closed_box, sphere};
 use nestrad_tests::form_factor::Traced;
 use nestrad_tests::scenery::Scenery;
@@ -30,18 +30,17 @@ fn heated(scenery: &Scenery, traced: &Traced, lit: &[usize]) -> Vec<f64> {
         absorbed: 1e-7,
         most_passes: 1000,
     };
-    let irradiance = solver::solve(
-        &scenery.problem,
+    let system = System {
+        problem: &scenery.problem,
         world,
         exchange,
-        &outlook,
-        &direct,
-        &fixed,
-        &[0],
-        &[1.0],
-        &tolerance,
-    )
-    .unwrap();
+        outlook: &outlook,
+        far: None,
+        direct_W_m2: &direct,
+        fixed_W_m2: &fixed,
+        incoming_W: &[1.0],
+    };
+    let irradiance = system.solve(&[0], &tolerance).unwrap();
     (0..world.rows())
         .map(|row| irradiance.mean(row, 0))
         .collect()

@@ -6,10 +6,10 @@
 use nestrad_common::generate::LeafAngles;
 use nestrad_common::optics::LeafOptics;
 use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Estimator, Plan};
+use nestrad_master::plan::Estimator;
 use nestrad_tests::canopies::{problem, small_leaves, uniform_sky};
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{Shares, by, finish, sampling, shares, solve};
+use nestrad_tests::solving::{Shares, by, finish, plan, sampling, shares, solve};
 use nestrad_tests::statistics::assert_within;
 
 /// Leaves of 2 cm in layers where light travels a metre between leaves: leaves that see the light see
@@ -18,7 +18,7 @@ use nestrad_tests::statistics::assert_within;
 const SMALL: f64 = 0.003;
 
 fn solved(problem: &Problem, estimator: Estimator) -> Vec<Shares> {
-    let mut plan = Plan::new(problem, &by(estimator));
+    let mut plan = plan(problem, &by(estimator));
     if let Some(planned) = &mut plan.sampling {
         *planned = sampling(estimator, 0.012, 16.0);
     }

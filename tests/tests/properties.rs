@@ -6,11 +6,11 @@ use glam::DVec3;
 use nestrad_common::optics::LeafOptics;
 use nestrad_common::problem::Problem;
 use nestrad_master::exchange::{BlockOf, trace_here};
-use nestrad_master::plan::{Plan, Settings};
+use nestrad_master::plan::Settings;
 use nestrad_master::solution::Solution;
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{ESTIMATORS, by, finish, shares, solve};
+use nestrad_tests::solving::{ESTIMATORS, by, finish, plan, shares, solve};
 use nestrad_tests::statistics::assert_within;
 use proptest::prelude::*;
 
@@ -46,7 +46,7 @@ fn one_thread_and_two_give_the_same_bits() {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().unwrap().install(|| {
-                let mut plan = Plan::new(&problem, &by(estimator));
+                let mut plan = plan(&problem, &by(estimator));
                 if let Some(sampling) = &mut plan.sampling {
                     sampling.least_samples = sampling.least_samples.min(16.0);
                 }
@@ -63,7 +63,7 @@ fn one_thread_and_two_give_the_same_bits() {
 #[test]
 fn one_job_and_many_give_the_same_bits() {
     let problem = maize();
-    let plan = Plan::new(&problem, &Settings::default());
+    let plan = plan(&problem, &Settings::default());
     let mut sampling = plan.sampling.unwrap();
     sampling.batches = 2;
     let world = plan.world(&problem);
@@ -312,7 +312,7 @@ proptest! {
     /// accounted for.
     #[test]
     fn energy_is_conserved(scenery in any_scenery()) {
-        let mut plan = Plan::new(&scenery.problem, &Settings::default());
+        let mut plan = plan(&scenery.problem, &Settings::default());
         plan.direct_line_area_m2 = 1e-4;
         if let Some(sampling) = &mut plan.sampling {
             sampling.line_area_m2 = 4e-4;

@@ -5,11 +5,11 @@
 
 use nestrad_common::options::Diameter;
 use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Plan, Settings};
+use nestrad_master::plan::Settings;
 use nestrad_master::solution::Solution;
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize};
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{finish, shares};
+use nestrad_tests::solving::{finish, plan, shares};
 
 fn maize(periodic: bool) -> Problem {
     let mut scenery = Scenery {
@@ -27,9 +27,7 @@ fn within(problem: &Problem, diameter: Diameter) -> Solution {
         diameter,
         ..Settings::default()
     };
-    finish(problem, &Plan::new(problem, &settings))
-        .unwrap()
-        .solution
+    finish(problem, &plan(problem, &settings)).unwrap().solution
 }
 
 /// Longer than any line of sight: the lowest of a few thousand directions stands about 1e-4 above the
