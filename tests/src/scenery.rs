@@ -1,6 +1,7 @@
 //! Scenes made by hand, one surface after the other.
 
 use glam::{DVec2, DVec3};
+use nestrad_common::elements::Elements;
 use nestrad_common::light::Source;
 use nestrad_common::optics::{Band, LeafOptics};
 use nestrad_common::problem::Problem;
@@ -101,6 +102,11 @@ impl Scenery {
             direction: direction.normalize(),
             irradiance_W_m2: vec![irradiance_W_m2; self.problem.bands.len()],
         });
+    }
+
+    /// Number of elements when edges are at most `max_edge_m`.
+    pub fn elements(&self, max_edge_m: f64) -> usize {
+        Elements::divide(&self.problem.scene, max_edge_m).len()
     }
 
     /// Number of an organ.

@@ -20,9 +20,14 @@ pub fn by(estimator: Estimator) -> Settings {
     }
 }
 
+/// What nestrad plans to do.
+pub fn plan(problem: &Problem, settings: &Settings) -> Plan {
+    Plan::new(problem, settings).unwrap()
+}
+
 /// Solves as planned for these settings.
 pub fn solve(problem: &Problem, settings: &Settings) -> Finished {
-    finish(problem, &Plan::new(problem, settings).unwrap()).unwrap()
+    finish(problem, &plan(problem, settings)).unwrap()
 }
 
 /// Solves by a plan that a test has changed.

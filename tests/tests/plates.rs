@@ -120,3 +120,13 @@ fn plates_with_different_faces_follow_the_adding_of_layers() {
         }
     }
 }
+
+/// No reflection, or no transmission: light goes one way, or not at all.
+#[test]
+fn plates_that_only_transmit_or_only_reflect_follow_the_recursion() {
+    for (rho, tau) in [(0.0, 0.9), (0.9, 0.0), (0.0, 0.4)] {
+        for n in [2, 10] {
+            check(n, LeafOptics::symmetric(rho, tau), 0.2);
+        }
+    }
+}

@@ -1,0 +1,181 @@
+//! Lines and rays are independent estimators of one exchange: they must agree within their errors, and
+//! the errors that they state must be true.
+
+#![allow(clippy::unwrap_used)]
+#![allow(clippy::print_stderr, reason = "the figures are worth reading")]
+
+use nestrad_common::generate::{LeafAngles, LeafShape, RandomCanopy};
+use nestrad_common::problem::Problem;
+use nestrad_master::plan::{Estimator, Settings};
+use nestrad_master::run::Finished;
+use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
+use nestrad_tests::form_factor::Traced;
+use nestrad_tests::scenery::{Scenery, from_zenith};
+use nestrad_tests::solving::{by, finish, plan, sampling, shares};
+use nestrad_tests::statistics::{mean_and_deviation, median};
+
+fn lit(problem: Problem) -> Problem {
+    let mut scenery = Scenery { problem };
+    scenery.problem.sources = uniform_sky(8, 2);
+    scenery.source(from_zenith(40.0, 160.0), 400.0);
+    scenery.problem
+}
+
+fn maize() -> Problem {
+    lit(problem(&small_maize(), &par_and_nir(), Vec::new()))
+}
+
+fn discs() -> Problem {
+    let canopy = RandomCanopy {
+        leaf_area_index: 3.0,
+        angles: LeafAngles::Planophile,
+        shape: LeafShape::Disc,
+        leaf_m2: 2e-3,
+        size_m: glam::DVec2::new(0.4, 0.3),
+        height_m: 0.5,
+        seed: 2,
+    };
+    lit(problem(
+        &canopy.generate().unwrap(),
+        &par_and_nir(),
+        Vec::new(),
+    ))
+}
+
+fn solved(problem: &Problem, estimator: Estimator, rays: f64) -> Finished {
+    let mut plan = plan(problem, &by(estimator));
+    if let (Estimator::Rays, Some(sampling)) = (estimator, &mut plan.sampling) {
+        sampling.least_samples = rays;
+    }
+    finish(problem, &plan).unwrap()
+}
+
+#[test]
+fn lines_and_rays_agree() {
+    for (name, problem, rays) in [("maize", maize(), 128.0), ("discs", discs(), 512.0)] {
+        let lines = solved(&problem, Estimator::Lines, 0.0).solution;
+        let rays = solved(&problem, Estimator::Rays, rays).solution;
+        let (mut beyond, mut organs) = (0, 0);
+        for b in 0..2 {
+            let (l, r) = (shares(&lines, b), shares(&rays, b));
+            eprintln!("{name} {b}: {l:.5?} {r:.5?}");
+            for (l, r) in [(l.plants, r.plants), (l.soil, r.soil), (l.up, r.up)] {
+                assert!(
+                    (l - r).abs() < 1e-3,
+                    "{name} band {b}: {l} of lines, {r} of rays"
+                );
+            }
+            for o in 0..problem.scene.organs.len() {
+                let (l, r) = (&lines.organs[2 * o + b], &rays.organs[2 * o + b]);
+                // both share the direct light, lattice and all
+                let se = l.absorbed_se_W.hypot(r.absorbed_se_W);
+                organs += 1;
+                beyond += usize::from((l.absorbed_W - r.absorbed_W).abs() > 3.0 * se);
+            }
+        }
+        eprintln!("{name}: {beyond} of {organs} beyond 3 standard errors");
+        assert!(100 * beyond <= organs, "{name}: {beyond} of {organs}");
+    }
+}
+
+/// A(i) F(i,j) of one half of the lines is A(j) F(j,i) of the other half within their errors.
+#[test]
+fn exchange_of_two_organs_is_mutual() {
+    let problem = maize();
+    let sampling = sampling(Estimator::Lines, 0.006, 0.0);
+    let traced = Traced::new(&problem, 0.05, &sampling);
+    let organs = problem.scene.organs.len();
+    let sides = [
+        nestrad_common::ends::Side::Upper,
+        nestrad_common::ends::Side::Lower,
+    ];
+    let half = sampling.batches as usize / 2;
+    let (mut z, mut beyond) = (Vec::new(), 0);
+    for i in 0..organs {
+        for j in 0..i {
+            for (s, t) in sides.iter().flat_map(|s| sides.map(|t| (*s, t))) {
+                let (from, to) = (traced.rows(i, s), traced.rows(j, t));
+                if solid(&problem, &traced, i) || solid(&problem, &traced, j) {
+                    continue;
+                }
+                let area = |rows: &[usize]| -> f64 {
+                    rows.iter()
+                        .map(|&r| traced.world.row_area_m2(r as u32))
+                        .sum()
+                };
+                let there = traced.part_seen(&from, 0..half, |end| traced.is(end, j, t));
+                let back = traced.part_seen(&to, half..2 * half, |end| traced.is(end, i, s));
+                let (a, b) = (area(&from), area(&to));
+                let se = (a * there.se).hypot(b * back.se);
+                // a few lines have no normal distribution
+                if there.value * a < 1e-4 {
+                    continue;
+                }
+                z.push((a * there.value - b * back.value) / se);
+            }
+        }
+    }
+    for z in &z {
+        beyond += usize::from(z.abs() > 4.0);
+    }
+    let rms = (z.iter().map(|z| z * z).sum::<f64>() / z.len() as f64).sqrt();
+    let mean = z.iter().sum::<f64>() / z.len() as f64;
+    eprintln!(
+        "{} pairs: rms {rms:.2}, mean {mean:.2}, {beyond} beyond 4",
+        z.len()
+    );
+    assert!(z.len() > 100);
+    assert!((0.7..1.3).contains(&rms), "rms {rms}");
+    assert!(100 * beyond <= z.len(), "{beyond} of {}", z.len());
+}
+
+fn solid(problem: &Problem, traced: &Traced, organ: usize) -> bool {
+    let of = problem
+        .scene
+        .organ
+        .iter()
+        .position(|&o| o as usize == organ);
+    traced.world.solid[of.unwrap()]
+}
+
+/// Over 20 seeds: rms of (value - mean) / stated error, for the median organ.
+#[test]
+fn stated_errors_are_true() {
+    const SEEDS: u64 = 20;
+    let problem = maize();
+    let (organs, bands) = (problem.scene.organs.len(), problem.bands.len());
+    let runs: Vec<Finished> = (1..=SEEDS)
+        .map(|seed| {
+            let settings = Settings {
+                seed,
+                ..Settings::default()
+            };
+            finish(&problem, &plan(&problem, &settings)).unwrap()
+        })
+        .collect();
+    for b in 0..bands {
+        let ratios: Vec<f64> = (0..organs)
+            .filter(|&o| runs[0].solution.organ_area_m2[o] > 1e-4)
+            .map(|o| {
+                let of = |k: usize| &runs[k].solution.organs[o * bands + b];
+                let values: Vec<f64> = (0..runs.len()).map(|k| of(k).absorbed_W).collect();
+                let (mean, _) = mean_and_deviation(&values);
+                let n = values.len() as f64;
+                let squares = (0..runs.len())
+                    .map(|k| ((of(k).absorbed_W - mean) / of(k).absorbed_se_W).powi(2));
+                // the mean is of the same values
+                (squares.sum::<f64>() / (n - 1.0)).sqrt()
+            })
+            .collect();
+        let middle = median(ratios.clone());
+        let (low, high) = (
+            ratios.iter().copied().fold(f64::INFINITY, f64::min),
+            ratios.iter().copied().fold(0.0, f64::max),
+        );
+        eprintln!("band {b}: median {middle:.3}, from {low:.2} to {high:.2}");
+        assert!(
+            (0.8..=1.25).contains(&middle),
+            "band {b}: median {middle:.3}"
+        );
+    }
+}

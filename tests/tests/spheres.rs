@@ -1,0 +1,82 @@
+//! Near exchange within a sphere, the rest through the far field (DESIGN, sections 2 and 3).
+
+#![allow(clippy::unwrap_used)]
+#![allow(clippy::print_stderr, reason = "the figures are worth reading")]
+
+use nestrad_common::options::Diameter;
+use nestrad_common::problem::Problem;
+use nestrad_master::plan::Settings;
+use nestrad_master::solution::Solution;
+use nestrad_tests::canopies::{par_and_nir, problem, small_maize};
+use nestrad_tests::scenery::{Scenery, from_zenith};
+use nestrad_tests::solving::{finish, plan, shares};
+
+fn maize(periodic: bool) -> Problem {
+    let mut scenery = Scenery {
+        problem: problem(&small_maize(), &par_and_nir(), Vec::new()),
+    };
+    if !periodic {
+        scenery.problem.scene.pattern = None;
+    }
+    scenery.source(from_zenith(40.0, 160.0), 400.0);
+    scenery.problem
+}
+
+fn within(problem: &Problem, diameter: Diameter) -> Solution {
+    let settings = Settings {
+        diameter,
+        ..Settings::default()
+    };
+    finish(problem, &plan(problem, &settings)).unwrap().solution
+}
+
+/// Longer than any line of sight: the lowest of a few thousand directions stands about 1e-4 above the
+/// horizon, and the scene is 2 m high.
+const LONGER_M: f64 = 1e7;
+
+#[test]
+fn a_sphere_larger_than_a_periodic_scene_changes_no_bit() {
+    let problem = maize(true);
+    let whole = within(&problem, Diameter::Infinite);
+    assert!(whole == within(&problem, Diameter::Metres(LONGER_M)));
+}
+
+#[test]
+fn a_sphere_larger_than_an_isolated_scene_changes_no_bit() {
+    let problem = maize(false);
+    let whole = within(&problem, Diameter::Infinite);
+    assert!(whole == within(&problem, Diameter::Metres(LONGER_M)));
+    // no plants are farther apart than 10 m: what leaves them sideways sees the sky, or the soil
+    assert!(whole == within(&problem, Diameter::Metres(20.0)));
+}
+
+/// Organs against plain radiosity: the error falls as the sphere grows, and energy stays conserved.
+#[test]
+fn a_growing_sphere_comes_ever_closer_to_plain_radiosity() {
+    let problem = maize(true);
+    let whole = within(&problem, Diameter::Infinite);
+    for band in 0..2 {
+        let mut last = f64::INFINITY;
+        for diameter in [0.2, 0.8, 3.2] {
+            let part = within(&problem, Diameter::Metres(diameter));
+            let (mut error2, mut all2) = (0.0, 0.0);
+            for (a, b) in whole.organs.iter().zip(&part.organs).skip(band).step_by(2) {
+                error2 += (a.absorbed_W - b.absorbed_W).powi(2);
+                all2 += a.absorbed_W.powi(2);
+            }
+            let error = (error2 / all2).sqrt();
+            let closure = shares(&part, band).closure;
+            eprintln!("band {band}, D = {diameter} m: {error:.4}, closure {closure:.4}");
+            assert!(
+                error <= last.max(0.003),
+                "band {band}, D = {diameter} m: {error}"
+            );
+            assert!(
+                closure.abs() < 0.02,
+                "band {band}, D = {diameter} m: closure {closure}"
+            );
+            last = error;
+        }
+        assert!(last < 0.01, "band {band}: {last}");
+    }
+}
