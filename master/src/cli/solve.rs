@@ -52,8 +52,8 @@ struct HowFlags {
 
     /// Standard error to aim at, percent: rms over organs, relative to the canopy's mean [default: 0.5]
     ///
-    /// It sets how many lines are traced, and how many directions a built-in sky has (46 at 0.5 %,
-    /// in inverse proportion, 16 to 1000).
+    /// It sets how many lines are traced, and how many directions a built-in sky has (476 at 0.5 %,
+    /// 200 at 1 %, 85 at 2 %; 4000 at most).
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     accuracy: Option<f64>,
 

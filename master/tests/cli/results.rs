@@ -190,7 +190,7 @@ fn a_plant_alone_under_a_sky() {
         "--irradiance",
         "PAR=300",
         "--accuracy",
-        "1",
+        "2",
         "--out",
         "out",
     ]);
@@ -200,7 +200,7 @@ fn a_plant_alone_under_a_sky() {
         ["organs.csv", "summary.json", "triangles.csv"]
     );
     let summary: Value = serde_json::from_str(&desk.text("out/summary.json")).unwrap();
-    assert_eq!(summary["options"]["sources"], 23);
+    assert_eq!(summary["options"]["sources"], 85);
 }
 
 #[test]
