@@ -115,12 +115,14 @@ impl Lattice {
         let wanted_y = (size.y / (side * d.z.powf(along_x - 1.0))).clamp(1.0, MAX_SIDE);
         let [nx, ny] = sides(size.x * size.y * d.z / line_area_m2, wanted_y, random[2]);
         let steps_per_m = DVec2::new(nx.max(1.0), ny) / size;
+        // an open lattice that is not aligned with its box has one more point along a side
+        let points = |n: f64| n as u32 + u32::from(!extent.periodic && n > 0.0);
         // s = (z - z_min) / d.z runs over at most this range
         let s_range = (height / d.z).max(f64::MIN_POSITIVE);
         Self {
             direction: d,
-            nx: nx as u32,
-            ny: ny as u32,
+            nx: points(nx),
+            ny: points(ny),
             periodic: extent.periodic,
             line_area_m2: size.x * size.y * d.z / (nx.max(1.0) * ny),
             steps_per_m,

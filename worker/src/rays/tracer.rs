@@ -155,17 +155,17 @@ impl Tracer {
         }
     }
 
-    /// How far a ray can go before it has passed all leaves, metres.
+    /// How far a ray can go before it has passed all leaves, metres; a hair more, so that rounding does
+    /// not lose what lies exactly at their top or bottom.
     fn reach_m(&self, ray: &FaceRay) -> f64 {
         let z = if ray.direction.z > 0.0 {
             self.z_max_m
         } else {
             self.z_min_m
         };
-        if ray.direction.z == 0.0 {
-            f64::INFINITY
-        } else {
-            (z - ray.origin.z) / ray.direction.z
+        match ray.direction.z {
+            0.0 => f64::INFINITY,
+            dz => (z - ray.origin.z) / dz * (1.0 + 1e-9) + 1e-9 / dz.abs(),
         }
     }
 
