@@ -51,7 +51,7 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
     }
     let Some(light) = &inputs.light else {
         return Err(LoadError::Missing {
-            expected: "light: a .light file or a sky",
+            expected: "light (--light or --sky, or light in a scene file)",
         });
     };
     light.check()?;
@@ -129,7 +129,7 @@ fn band_names(inputs: &Inputs) -> Result<Vec<String>, LoadError> {
     let names: Vec<String> = inputs.bands.iter().map(|band| band.name.clone()).collect();
     if names.is_empty() {
         return Err(LoadError::Missing {
-            expected: "at least one band with its optics",
+            expected: "at least one band with its optics (--optics, or [[bands]] in a scene file)",
         });
     }
     for (index, name) in names.iter().enumerate() {

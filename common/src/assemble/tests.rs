@@ -155,7 +155,7 @@ fn what_is_missing_is_named() {
     case.inputs.light = None;
     assert_eq!(
         case.refusal(),
-        "expected light: a .light file or a sky, found none"
+        "expected light (--light or --sky, or light in a scene file), found none"
     );
     case.inputs.scenes.clear();
     assert_eq!(
@@ -165,7 +165,7 @@ fn what_is_missing_is_named() {
     case.inputs.bands.clear();
     assert_eq!(
         case.refusal(),
-        "expected at least one band with its optics, found none"
+        "expected at least one band with its optics (--optics, or [[bands]] in a scene file), found none"
     );
 
     let mut case = Case::new(LEAF);

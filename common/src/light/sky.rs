@@ -26,13 +26,16 @@ const GOLDEN_ANGLE: f64 = TAU * 0.381_966_011_250_105_1;
 /// and that band holds 1 / directions² of a uniform sky.
 const LOWEST_IN_BAND: f64 = 0.25;
 
-/// Directions for a sky that is to err by little beside `accuracy_percent` (of an organ's absorbed
-/// power): 46 at 0.5 %, and in inverse proportion, as the error of a well-spread set of directions goes;
-/// 16 at least, so that no leaf is lit by a handful of suns, and 1000 at most.
+/// Directions for a sky whose own error, with so many of them, is about `accuracy_percent`: rms over
+/// organs, relative to the mean of what the canopy absorbs.
+///
+/// Measured on generated maize under overcast skies, between realisations: 8.6 % with 16 directions,
+/// 6.0 % with 23, 3.2 % with 46, 1.9 % with 92. Leaves cast sharp shadows, so this falls no faster than
+/// n^-0.8. 16 at least, so that no leaf is lit by a handful of suns, and 4000 at most.
 pub fn directions_for(accuracy_percent: f64) -> NonZeroUsize {
     // a NaN becomes 0, and so 16 directions
-    let wanted = (23.0 / accuracy_percent).ceil() as usize;
-    NonZeroUsize::MIN.saturating_add(wanted.clamp(16, 1000) - 1)
+    let wanted = (200.0 * accuracy_percent.powf(-1.25)).ceil() as usize;
+    NonZeroUsize::MIN.saturating_add(wanted.clamp(16, 4000) - 1)
 }
 
 impl SkyLight {

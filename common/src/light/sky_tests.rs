@@ -168,3 +168,20 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn the_number_of_directions_follows_the_accuracy() {
+    for (accuracy_percent, expected) in [
+        (0.5, 476),
+        (1.0, 200),
+        (2.0, 85),
+        (50.0, 16),
+        (f64::INFINITY, 16),
+        (f64::NAN, 16),
+        (1e-3, 4000),
+        (0.0, 4000),
+    ] {
+        let found = directions_for(accuracy_percent).get();
+        assert_eq!(found, expected, "{accuracy_percent}");
+    }
+}

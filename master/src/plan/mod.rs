@@ -122,7 +122,7 @@ impl Plan {
         let radius_m =
             radius_m.filter(|&r| sampling.is_some_and(|s| r < s.longest_sight_m(scale.height_m)));
         let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
-        let max_edge_m = (scale.organ_area_m2.sqrt() / 4.0)
+        let max_edge_m = (scale.organ_area_m2.sqrt() / 6.0)
             .min((scale.ground_area_m2 / 1000.0).sqrt())
             .max(f64::MIN_POSITIVE)
             .min(radius_m.unwrap_or(f64::INFINITY))
@@ -230,7 +230,7 @@ fn far_field(settings: &Settings) -> Resolution {
     Resolution {
         levels: 65,
         bins: 6,
-        sets: (2.0 * more).round().clamp(1.0, 64.0) as u32,
+        sets: (16.0 * more).round().clamp(1.0, 256.0) as u32,
         lines: (24_000.0 * more).clamp(1e4, 1e6) as u32,
         seed: settings.seed,
     }
