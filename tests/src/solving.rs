@@ -20,6 +20,15 @@ pub fn by(estimator: Estimator) -> Settings {
     }
 }
 
+/// Settings for tests that compare solves of a small scene with one another: three times coarser than
+/// the defaults.
+pub fn coarse() -> Settings {
+    Settings {
+        accuracy_percent: 1.5,
+        ..Settings::default()
+    }
+}
+
 /// What nestrad plans to do.
 pub fn plan(problem: &Problem, settings: &Settings) -> Plan {
     Plan::new(problem, settings).unwrap()

@@ -51,7 +51,7 @@ fn an_isolated_plate_gets_the_light_of_its_area() {
         let (mean, se) = absorbed(&scenery.problem, 0.005)[0];
         // vertical lines on a plate as large as the scene are always as many
         let se = se.max(1e-6);
-        assert_close(&format!("zenith {zenith}"), mean, 60.0, se, 4.0, 0.1);
+        assert_close(&format!("zenith {zenith}"), mean, 60.0, se, 4.0, 0.15);
     }
 }
 

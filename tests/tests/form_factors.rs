@@ -1,6 +1,6 @@
 //! Form factors with closed forms (DESIGN, section 7), counted from the rows of the real kernel.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::print_stderr, reason = "the figures are worth reading")]
 
 use std::f64::consts::{PI, TAU};
 

@@ -36,7 +36,7 @@ fn leaves() -> Vec<[DVec3; 3]> {
                 0.3 * at(0.569_840),
                 0.25 * at(0.618_034),
             );
-            let turn = 6.28 * at(0.414_214);
+            let turn = std::f64::consts::TAU * at(0.414_214);
             let along = DVec3::new(turn.cos(), turn.sin(), at(0.732_051) - 0.5);
             let across = DVec3::new(-turn.sin(), turn.cos(), 0.3);
             [foot, foot + 0.08 * along, foot + 0.06 * across]

@@ -9,7 +9,7 @@ use nestrad_common::problem::Problem;
 use nestrad_master::plan::Estimator;
 use nestrad_tests::canopies::{problem, small_leaves, uniform_sky};
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{Shares, by, finish, plan, sampling, shares, solve};
+use nestrad_tests::solving::{Shares, by, finish, plan, sampling, shares};
 use nestrad_tests::statistics::assert_within;
 
 /// Leaves of 2 cm in layers where light travels a metre between leaves: leaves that see the light see
@@ -20,9 +20,10 @@ const SMALL: f64 = 0.003;
 fn solved(problem: &Problem, estimator: Estimator) -> Vec<Shares> {
     let mut plan = plan(problem, &by(estimator));
     if let Some(planned) = &mut plan.sampling {
-        *planned = sampling(estimator, 0.012, 16.0);
+        *planned = sampling(estimator, 0.01, 48.0);
     }
-    plan.direct_line_area_m2 = 0.006 * 0.006;
+    // leaves of 2 cm are not to be cut: there are thousands
+    (plan.max_edge_m, plan.direct_line_area_m2) = (0.03, 0.006 * 0.006);
     let solution = finish(problem, &plan).unwrap().solution;
     (0..problem.bands.len())
         .map(|b| shares(&solution, b))
@@ -86,7 +87,7 @@ fn where_nothing_absorbs_all_light_comes_back() {
         let canopy = small_leaves(1.0, LeafAngles::Spherical, 4e-3, 7);
         let white = LeafOptics::symmetric(rho, tau);
         let problem = problem(&canopy, &[(white, 1.0)], uniform_sky(6, 1));
-        let found = shares(&solve(&problem, &by(Estimator::Lines)).solution, 0);
+        let found = solved(&problem, Estimator::Lines)[0];
         assert_within(
             &format!("albedo of rho {rho} tau {tau}"),
             found.up,
