@@ -60,7 +60,7 @@ impl Ends {
         self.rows() + 2
     }
 
-    /// The inside of something solid: what looks at it is buried.
+    /// What a face sees where it is buried in something solid.
     pub fn buried(&self) -> u32 {
         self.rows() + 3
     }

@@ -45,15 +45,6 @@ pub struct LeafOptics {
 }
 
 impl LeafOptics {
-    /// The surface of something solid: its outside (the upper face) reflects, and what light gets to
-    /// its inside, through an open end, stays there.
-    pub fn solid(rho: f64) -> Self {
-        Self {
-            upper: FaceOptics { rho, tau: 0.0 },
-            lower: FaceOptics::default(),
-        }
-    }
-
     /// An opaque material with the same reflectance on both faces.
     pub fn opaque(rho: f64) -> Self {
         let face = FaceOptics { rho, tau: 0.0 };

@@ -99,66 +99,74 @@ pub struct Outlook {
     pub weight: [Vec<f64>; 2],
     /// The part of each row that is not buried in something solid.
     pub exposed: Vec<f64>,
-    /// The part of what each row sends out that leaves to the sky.
-    pub to_sky: Vec<f64>,
-    /// The part of what each row sends out that leaves downwards, or to the soil beyond the map.
-    pub to_void: Vec<f64>,
+    /// The part of what each row sends out that leaves to the sky, by the lines of each half.
+    pub to_sky: [Vec<f64>; 2],
+    /// The part that leaves downwards, or to the soil beyond the map.
+    pub to_void: [Vec<f64>; 2],
 }
 
 impl Exchange {
     /// Counts what is seen by each row.
     pub fn outlook(&self, world: &World) -> Outlook {
         let half = self.batches.len() / 2;
-        let rows: Vec<[f64; 5]> = (0..world.rows())
+        let seen: Vec<[Seen; 2]> = (0..world.rows())
             .into_par_iter()
             .map(|row| {
-                // lines that count in each half, buried ones, those to the sky, those below
-                let (mut counted, mut buried, mut sky, mut void) =
-                    ([0usize; 2], 0usize, 0usize, 0usize);
+                let mut seen = [Seen::default(); 2];
                 for (k, batch) in self.batches.iter().enumerate() {
-                    let counted = &mut counted[usize::from(k >= half)];
-                    for &end in batch.row(row) {
-                        // ends that are not rows are rare
-                        if end < world.ends.sky() {
-                            *counted += 1;
-                        } else if end == world.ends.buried() {
-                            buried += 1;
-                        } else {
-                            *counted += 1;
-                            sky += usize::from(end == world.ends.sky());
-                            void += usize::from(
-                                end == world.ends.void() || end == world.ends.outer_soil(),
-                            );
-                        }
-                    }
+                    seen[usize::from(k >= half)].count(world, batch.row(row));
                 }
-                let all = counted[0] + counted[1];
-                let per = |part: usize, of: usize| {
-                    if of == 0 {
-                        0.0
-                    } else {
-                        part as f64 / of as f64
-                    }
-                };
-                [
-                    per(1, counted[0]),
-                    per(1, counted[1]),
-                    if buried == 0 {
-                        1.0
-                    } else {
-                        per(all, all + buried)
-                    },
-                    per(sky, all),
-                    per(void, all),
-                ]
+                seen
             })
             .collect();
-        let column = |c: usize| rows.iter().map(|r| r[c]).collect::<Vec<f64>>();
+        let per = |part: usize, of: usize| {
+            if of == 0 {
+                0.0
+            } else {
+                part as f64 / of as f64
+            }
+        };
+        let exposed = |[a, b]: &[Seen; 2]| match (a.counted + b.counted, a.buried + b.buried) {
+            (_, 0) => 1.0,
+            (counted, buried) => per(counted, counted + buried),
+        };
+        // a row without lines in a half is judged by those of the other
+        let part = |of: fn(&Seen) -> usize| {
+            [0, 1].map(|h: usize| {
+                let judge = |s: &[Seen; 2]| if s[h].counted > 0 { s[h] } else { s[1 - h] };
+                seen.iter()
+                    .map(|s| per(of(&judge(s)), judge(s).counted))
+                    .collect::<Vec<f64>>()
+            })
+        };
         Outlook {
-            weight: [column(0), column(1)],
-            exposed: column(2),
-            to_sky: column(3),
-            to_void: column(4),
+            weight: [0, 1].map(|h: usize| seen.iter().map(|s| per(1, s[h].counted)).collect()),
+            exposed: seen.iter().map(exposed).collect(),
+            to_sky: part(|s| s.sky),
+            to_void: part(|s| s.void),
+        }
+    }
+}
+
+/// Lines of a row in one half, by what they see.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// All that are not buried.
+    counted: usize,
+    buried: usize,
+    sky: usize,
+    void: usize,
+}
+
+impl Seen {
+    fn count(&mut self, world: &World, row: &[u32]) {
+        let ends = &world.ends;
+        for &end in row {
+            let buried = end == ends.buried();
+            self.buried += usize::from(buried);
+            self.counted += usize::from(!buried);
+            self.sky += usize::from(end == ends.sky());
+            self.void += usize::from(end == ends.void() || end == ends.outer_soil());
         }
     }
 }

@@ -171,34 +171,41 @@ impl Parts<'_> {
     }
 
     /// Scattered power that leaves the scene upwards and downwards, W.
+    ///
+    /// What a face sends out by one half is taken to leave along the lines of the other: a face that by
+    /// chance sees more of the sky gets less light by the same lines.
     fn escaped_W(&self, band: &Band, k: usize) -> [f64; 2] {
         let world = self.world;
         if world.ends.far_len() > 0 {
             return self.escaped_far_W(k);
         }
         let mut sum = [0.0; 2];
-        let mut add = |row: usize, radiosity: f64| {
-            let power = radiosity * world.row_area_m2(row as u32) * self.outlook.exposed[row];
-            sum[0] += power * self.outlook.to_sky[row];
-            sum[1] += power * self.outlook.to_void[row];
-        };
-        for (e, &t) in world.triangle_of_element.iter().enumerate() {
-            let optics = band.materials[self.problem.scene.material[t as usize] as usize];
-            let (on_upper, on_lower) = (
-                self.irradiance.mean(2 * e, k),
-                self.irradiance.mean(2 * e + 1, k),
+        for (half, irradiance) in self.irradiance.halves.iter().enumerate() {
+            let on = |row: usize| irradiance[row * self.irradiance.bands + k];
+            let (to_sky, to_void) = (
+                &self.outlook.to_sky[1 - half],
+                &self.outlook.to_void[1 - half],
             );
-            add(
-                2 * e,
-                optics.upper.rho * on_upper + optics.lower.tau * on_lower,
-            );
-            add(
-                2 * e + 1,
-                optics.lower.rho * on_lower + optics.upper.tau * on_upper,
-            );
-        }
-        for row in world.ends.faces() as usize..world.rows() {
-            add(row, band.soil_albedo * self.irradiance.mean(row, k));
+            let mut add = |row: usize, radiosity: f64| {
+                let power =
+                    0.5 * radiosity * world.row_area_m2(row as u32) * self.outlook.exposed[row];
+                sum[0] += power * to_sky[row];
+                sum[1] += power * to_void[row];
+            };
+            for (e, &t) in world.triangle_of_element.iter().enumerate() {
+                let optics = band.materials[self.problem.scene.material[t as usize] as usize];
+                add(
+                    2 * e,
+                    optics.upper.rho * on(2 * e) + optics.lower.tau * on(2 * e + 1),
+                );
+                add(
+                    2 * e + 1,
+                    optics.lower.rho * on(2 * e + 1) + optics.upper.tau * on(2 * e),
+                );
+            }
+            for row in world.ends.faces() as usize..world.rows() {
+                add(row, band.soil_albedo * on(row));
+            }
         }
         sum
     }

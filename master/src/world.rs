@@ -17,8 +17,8 @@ pub struct World {
     pub elements: Elements,
     /// The triangle of each element.
     pub triangle_of_element: Vec<u32>,
-    /// Whether the lower face of each triangle is the inside of something solid: it takes part in
-    /// nothing, and what is buried inside gets and gives no light.
+    /// Whether the lower face of each triangle is the inside of something solid: what is buried there
+    /// gets and gives no light.
     pub solid: Vec<bool>,
     /// Where lines run.
     pub extent: Extent,

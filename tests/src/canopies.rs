@@ -46,7 +46,7 @@ pub fn problem(
         name: format!("rho {} tau {}", leaf.upper.rho, leaf.upper.tau),
         soil_albedo,
         materials: vec![
-            LeafOptics::solid(0.5 * (leaf.upper.rho + leaf.lower.rho)),
+            LeafOptics::opaque(0.5 * (leaf.upper.rho + leaf.lower.rho)),
             leaf,
         ],
     };

@@ -26,6 +26,8 @@ pub struct Block {
     pub(crate) local_faces: u32,
     /// What each local end is seen as: its number in the scene.
     pub(crate) seen_as: Vec<u32>,
+    /// Whether each local element is on the surface of something solid.
+    pub(crate) solid: Vec<bool>,
     /// One-sided area of each local element, m².
     pub(crate) area_m2: Vec<f64>,
     /// Row of each local end; [`Self::rows`] for an end that has none here.
@@ -102,7 +104,8 @@ impl Block {
             .collect();
 
         let mut first = Vec::with_capacity(count + 1);
-        let (mut seen_as, mut area_m2, mut row) = (Vec::new(), Vec::new(), Vec::new());
+        let (mut seen_as, mut solid, mut area_m2, mut row) =
+            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut rows = 0;
         let mut next = 0;
         for (t, &n) in block.divisions.iter().enumerate() {
@@ -120,11 +123,10 @@ impl Block {
             let area = geometry::area(&triangles[t]) / f64::from(n * n);
             for e in start..next {
                 area_m2.push(area);
-                let inside = block.solid[t];
-                seen_as.extend([2 * e, if inside { ends.buried() } else { 2 * e + 1 }]);
-                for has_row in [block.owned[t], block.owned[t] && !inside] {
-                    row.push(if has_row { rows } else { NO_ROW });
-                    // every face of an owned triangle has its place in the result
+                solid.push(block.solid[t]);
+                seen_as.extend([2 * e, 2 * e + 1]);
+                for _ in 0..2 {
+                    row.push(if block.owned[t] { rows } else { NO_ROW });
                     rows += u32::from(block.owned[t]);
                 }
             }
@@ -155,6 +157,7 @@ impl Block {
             divisions: block.divisions.clone(),
             local_faces,
             seen_as,
+            solid,
             area_m2,
             row,
             rows: rows as usize,
@@ -170,6 +173,17 @@ impl Block {
     pub(crate) fn shift_m(&self, copy: [i64; 2]) -> DVec3 {
         let size = self.extent.max_m - self.extent.min_m;
         DVec3::new(copy[0] as f64 * size.x, copy[1] as f64 * size.y, 0.0)
+    }
+
+    /// Whether a local face belongs to the surface of something solid, outside or inside.
+    #[inline]
+    pub(crate) fn is_solid(&self, face: u32) -> bool {
+        self.solid[face as usize / 2]
+    }
+
+    /// Whether a local end is the inside of something solid.
+    pub(crate) fn is_inside(&self, local: u32) -> bool {
+        local < self.local_faces && local % 2 == 1 && self.is_solid(local)
     }
 
     /// Whether rows of a local end are wanted.

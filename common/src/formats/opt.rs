@@ -83,8 +83,7 @@ pub fn parse(file: &str, bytes: &[u8]) -> Result<Opt, FormatError> {
 
 fn species(fields: &mut Fields<'_>) -> Result<Species, FormatError> {
     fields.keyword("d")?;
-    let stem = LeafOptics::solid(fields.number("rho of the stem")?);
-    checked(fields, stem)?;
+    let stem = opaque(fields, "rho of the stem")?;
     let leaf = LeafOptics {
         upper: face(fields, "upper")?,
         lower: face(fields, "lower")?,
@@ -134,7 +133,7 @@ mod tests {
         assert_eq!((leaf.upper.rho, leaf.upper.tau), (0.09, 0.05));
         assert_eq!((leaf.lower.rho, leaf.lower.tau), (0.11, 0.04));
         let stem = opt.material(&Material::Stem { species: 2 });
-        assert_eq!(stem, Some(LeafOptics::solid(0.2)));
+        assert_eq!(stem, Some(LeafOptics::opaque(0.2)));
         assert_eq!(
             opt.material(&Material::Soil),
             Some(LeafOptics::opaque(0.15))

@@ -122,7 +122,7 @@ impl Plan {
         let radius_m =
             radius_m.filter(|&r| sampling.is_some_and(|s| r < s.longest_sight_m(scale.height_m)));
         let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
-        let max_edge_m = (scale.organ_area_m2.sqrt() / 4.0)
+        let max_edge_m = (scale.organ_area_m2.sqrt() / 6.0)
             .min((scale.ground_area_m2 / 1000.0).sqrt())
             .max(f64::MIN_POSITIVE)
             .min(radius_m.unwrap_or(f64::INFINITY))

@@ -106,8 +106,8 @@ fn faces(problem: &Problem) -> String {
         .filter(|&&m| matches!(problem.scene.materials[m as usize], Material::Stem { .. }))
         .count();
     format!(
-        "faces: two for {} triangles, one for {solid} on the surface of something solid",
-        problem.scene.triangles.len() - solid
+        "faces: two for each of {} triangles; {solid} of them enclose something solid, where leaves that stick in it are dark",
+        problem.scene.triangles.len()
     )
 }
 

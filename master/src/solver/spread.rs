@@ -207,16 +207,10 @@ impl Spread<'_> {
     }
 
     fn escape(&self, balance: &mut [Pull; 4], row: usize, weight: f64, change: &Pull) {
-        add(
-            &mut balance[2],
-            weight * self.system.outlook.to_sky[row],
-            change,
-        );
-        add(
-            &mut balance[3],
-            weight * self.system.outlook.to_void[row],
-            change,
-        );
+        let outlook = self.system.outlook;
+        let part = |of: &[Vec<f64>; 2]| 0.5 * (of[0][row] + of[1][row]);
+        add(&mut balance[2], weight * part(&outlook.to_sky), change);
+        add(&mut balance[3], weight * part(&outlook.to_void), change);
     }
 }
 

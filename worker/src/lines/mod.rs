@@ -1,6 +1,7 @@
 //! Parallel lines: along each direction the block is scanned on a lattice, the hits of a line are
 //! sorted by depth, and neighbours along it see each other (DESIGN: section 4).
 
+mod burial;
 mod fragments;
 mod levels;
 mod sight;

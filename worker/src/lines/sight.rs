@@ -2,6 +2,7 @@
 
 use nestrad_common::lattice::{DEPTH_OF_TOP, Lattice};
 
+use super::burial::bury;
 use super::fragments::Hit;
 use crate::block::{Block, Soil};
 use crate::rows::Pair;
@@ -37,6 +38,14 @@ impl<'a> Sight<'a> {
 
     /// Adds the pairs along one line; `hits` by rising depth.
     pub(crate) fn along(&self, line: usize, hits: &[Hit], pairs: &mut Vec<Pair>) {
+        let start = pairs.len();
+        self.neighbours(line, hits, pairs);
+        if hits.iter().any(|h| self.block.is_solid(h.face_along())) {
+            bury(self.block, pairs, start);
+        }
+    }
+
+    fn neighbours(&self, line: usize, hits: &[Hit], pairs: &mut Vec<Pair>) {
         let bottom = match &self.soil {
             Some(soil) => soil
                 .cell(line)

@@ -93,6 +93,7 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
                 let origin = point(triangle, &corners, &mut rng);
                 let direction = cosine_direction(outward, (k, count), &mut rng);
                 let ray = FaceRay {
+                    face,
                     origin,
                     direction,
                     source: Some(t as u32),
@@ -122,6 +123,7 @@ fn from_soil(block: &Block, tracer: &Tracer, plan: &Plan, looks: &mut Vec<Pair>)
             let origin = (soil.min_m + (corner + within) * soil.cell_m).extend(soil.z_m);
             let direction = cosine_direction(DVec3::Z, (k, count), &mut rng);
             let ray = FaceRay {
+                face: row,
                 origin,
                 direction,
                 source: None,

@@ -113,23 +113,73 @@ impl Tracer {
             _ => f64::INFINITY,
         };
         // past the top or bottom of the leaves there is nothing more to hit
-        let leaves_t = to_height(if direction.z > 0.0 {
-            self.z_max_m
-        } else {
-            self.z_min_m
-        });
-        let limit = soil_t.min(leaves_t).min(block.radius_m);
+        let limit = soil_t.min(self.reach_m(ray)).min(block.radius_m);
         match self.nearest(block, ray, limit) {
-            Some(face) => face,
+            Some((_, face)) if self.is_buried(block, ray, face) => {
+                block.local(if block.is_inside(ray.face) {
+                    block.ends.void()
+                } else {
+                    block.ends.buried()
+                })
+            }
+            Some((_, face)) => face,
             None => beyond(block, origin, direction, soil_t, random),
         }
     }
 
-    fn nearest(&self, block: &Block, ray: &FaceRay, limit: f64) -> Option<u32> {
+    /// Whether a ray that sees `face` runs inside something solid (see `lines::burial`): the line it
+    /// lies on meets the inside at both ends.
+    fn is_buried(&self, block: &Block, ray: &FaceRay, face: u32) -> bool {
+        let back = || {
+            let reverse = FaceRay {
+                direction: -ray.direction,
+                ..*ray
+            };
+            self.nearest(block, &reverse, block.radius_m.min(self.reach_m(&reverse)))
+        };
+        let onwards = || {
+            let limit = block.radius_m.min(self.reach_m(ray));
+            let (t, _) = self.nearest(block, ray, limit)?;
+            let next = FaceRay {
+                origin: ray.origin + t * ray.direction,
+                source: self.triangle_of(block, face),
+                ..*ray
+            };
+            self.nearest(block, &next, limit - t)
+        };
+        let inside = |end: Option<(f64, u32)>| end.is_some_and(|(_, f)| block.is_inside(f));
+        match (block.is_inside(ray.face), block.is_inside(face)) {
+            (false, true) => inside(back()),
+            (true, false) => inside(onwards()),
+            (true, true) | (false, false) => false,
+        }
+    }
+
+    /// How far a ray can go before it has passed all leaves, metres.
+    fn reach_m(&self, ray: &FaceRay) -> f64 {
+        let z = if ray.direction.z > 0.0 {
+            self.z_max_m
+        } else {
+            self.z_min_m
+        };
+        if ray.direction.z == 0.0 {
+            f64::INFINITY
+        } else {
+            (z - ray.origin.z) / ray.direction.z
+        }
+    }
+
+    fn triangle_of(&self, block: &Block, face: u32) -> Option<u32> {
+        block
+            .first
+            .partition_point(|&f| f <= face / 2)
+            .checked_sub(1)
+            .map(|t| t as u32)
+    }
+
+    fn nearest(&self, block: &Block, ray: &FaceRay, limit: f64) -> Option<(f64, u32)> {
         if !block.extent.periodic {
-            return self
-                .nearest_in_pattern(block, ray, [0, 0], 0.0, limit)
-                .map(|(_, face)| face);
+            return self.nearest_in_pattern(block, ray, [0, 0], 0.0, limit);
         }
         // from pattern to pattern, in the order in which the ray crosses them
         let (min, max) = (block.extent.min_m.truncate(), block.extent.max_m.truncate());
@@ -141,7 +191,7 @@ impl Tracer {
             let (leaves, step) = exit(home, ray.direction, min, max);
             match self.nearest_in_pattern(block, ray, pattern, entered, limit) {
                 // what is hit farther on may be hidden by copies that do not reach into this pattern
-                Some((t, face)) if t <= leaves => return Some(face),
+                Some((t, face)) if t <= leaves => return Some((t, face)),
                 _ if leaves >= limit => return None,
                 _ => {}
             }
@@ -198,7 +248,10 @@ impl Tracer {
 }
 
 /// A ray from a face.
+#[derive(Clone, Copy)]
 pub(crate) struct FaceRay {
+    /// The local face, or soil cell, that it leaves.
+    pub(crate) face: u32,
     pub(crate) origin: DVec3,
     /// Unit vector.
     pub(crate) direction: DVec3,
