@@ -1,5 +1,7 @@
 //! Generated canopies are scenes like any other: what is written loads, and nothing is odd about it.
 
+#![allow(clippy::unwrap_used, reason = "what cannot be set up fails the test")]
+
 use nestrad_common::assemble::{load, load_scene_file};
 use nestrad_common::generate::{Bean, Generated, Maize, RandomCanopy};
 

@@ -16,7 +16,14 @@ fn generates_and_solves(canopy: &str, more: &[&str]) {
     let checked = desk.done(&["check", "demo/scene.toml"]).stdout;
     assert!(!checked.contains("warning"), "{checked}");
 
-    desk.done(&["solve", "demo/scene.toml", "--out", "demo/out"]);
+    desk.done(&[
+        "solve",
+        "demo/scene.toml",
+        "--accuracy",
+        "5",
+        "--out",
+        "demo/out",
+    ]);
     let organs = desk.text("demo/out/organs.csv");
     let bands = ["PAR", "NIR"].map(|band| organs.matches(&format!(",{band},")).count());
     assert!(bands[0] > 0 && bands[0] == bands[1], "{bands:?}");
