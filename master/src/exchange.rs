@@ -103,6 +103,8 @@ pub struct Outlook {
     pub to_sky: [Vec<f64>; 2],
     /// The part that leaves downwards, or to the soil beyond the map.
     pub to_void: [Vec<f64>; 2],
+    /// The part of what each row sees that is soil beyond the map of an open scene.
+    pub outer_soil: Vec<f64>,
 }
 
 impl Exchange {
@@ -144,6 +146,10 @@ impl Exchange {
             exposed: seen.iter().map(exposed).collect(),
             to_sky: part(|s| s.sky),
             to_void: part(|s| s.void),
+            outer_soil: seen
+                .iter()
+                .map(|[a, b]| per(a.outer + b.outer, a.counted + b.counted))
+                .collect(),
         }
     }
 }
@@ -156,6 +162,7 @@ struct Seen {
     buried: usize,
     sky: usize,
     void: usize,
+    outer: usize,
 }
 
 impl Seen {
@@ -166,7 +173,9 @@ impl Seen {
             self.buried += usize::from(buried);
             self.counted += usize::from(!buried);
             self.sky += usize::from(end == ends.sky());
-            self.void += usize::from(end == ends.void() || end == ends.outer_soil());
+            let outer = end == ends.outer_soil();
+            self.outer += usize::from(outer);
+            self.void += usize::from(outer || end == ends.void());
         }
     }
 }

@@ -153,7 +153,7 @@ impl Parts<'_> {
         }
         let [up, scattered_down] = self.solved(b).map_or([0.0; 2], |k| self.escaped_W(band, k));
         let down = scattered_down + self.direct.passed_W[b];
-        let incoming = self.direct.incoming_W[b];
+        let incoming = self.direct.incoming_W[b] + self.from_outer_soil_W(b);
         let variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
         let estimate = |value: f64, k: usize| Estimate {
             value,
@@ -168,6 +168,26 @@ impl Parts<'_> {
             escaped_down_W: estimate(down, 3),
             closure_W: estimate(incoming - plants - soil - up - down, 4),
         }
+    }
+
+    /// Power that the soil beyond the map of an open scene sends to what is on it, W.
+    fn from_outer_soil_W(&self, b: usize) -> f64 {
+        if self.world.extent.periodic || self.world.soil.is_none() || self.solved(b).is_none() {
+            return 0.0;
+        }
+        let incoming: f64 = self
+            .problem
+            .sources
+            .iter()
+            .map(|s| s.irradiance_W_m2[b])
+            .sum();
+        let radiosity = self.problem.bands[b].soil_albedo * incoming;
+        let seen_m2 = |row: usize| {
+            self.world.row_area_m2(row as u32)
+                * self.outlook.exposed[row]
+                * self.outlook.outer_soil[row]
+        };
+        radiosity * (0..self.world.rows()).map(seen_m2).sum::<f64>()
     }
 
     /// Scattered power that leaves the scene upwards and downwards, W.

@@ -47,7 +47,7 @@ pub struct SoilMap {
 pub struct Balance {
     /// Name of the band.
     pub band: String,
-    /// What the sources bring.
+    /// What the sources bring, and in an open scene what the soil beyond its map sends.
     pub incoming_W: f64,
     /// Absorbed by all triangles (soil triangles included in `absorbed_soil_W` instead).
     pub absorbed_plants_W: Estimate,

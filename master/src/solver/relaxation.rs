@@ -7,6 +7,10 @@
 /// `omega = 2 / (1 + sqrt(1 - lambda²))` by `omega - 1` (Young 1971). `lambda` is learnt from the
 /// ratio `mu` of successive changes by Young's relation `(mu + omega - 1)² = mu omega² lambda²`
 /// (Hageman & Young 1981, section 9.3).
+///
+/// The theory asks for real eigenvalues. Leaves whose faces differ strongly have complex ones, for which
+/// a large factor diverges; so when changes grow the factor is given up, for good: plain Gauss-Seidel
+/// converges wherever light is lost at all.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Relaxation {
     pub(super) omega: f64,
@@ -16,6 +20,8 @@ pub(super) struct Relaxation {
     age: u32,
     /// Ratio of the last two changes.
     ratio: f64,
+    /// Over-relaxation has failed.
+    plain: bool,
 }
 
 /// Passes with one factor before it is judged: the ratio of changes needs to settle.
@@ -29,6 +35,7 @@ impl Relaxation {
             last_change: None,
             age: 0,
             ratio: 1.0,
+            plain: false,
         }
     }
 
@@ -42,10 +49,14 @@ impl Relaxation {
             return change;
         }
         self.ratio = change / last;
+        if self.ratio > 1.0 && self.omega > 1.0 && self.age > 1 {
+            (self.omega, self.plain, self.age) = (1.0, true, 0);
+            return f64::INFINITY;
+        }
         // the asymptotic rate is never better than omega - 1
         let rate = self.ratio.max(self.omega - 1.0).min(0.9999);
         let left = change * rate / (1.0 - rate);
-        if self.age >= SETTLE && self.ratio < 1.0 && self.ratio > self.omega - 1.0 {
+        if !self.plain && self.age >= SETTLE && self.ratio < 1.0 && self.ratio > self.omega - 1.0 {
             let lambda_squared =
                 (self.ratio + self.omega - 1.0).powi(2) / (self.ratio * self.omega * self.omega);
             if lambda_squared > self.lambda_squared && lambda_squared < 1.0 {

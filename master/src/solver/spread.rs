@@ -222,7 +222,7 @@ impl<const N: usize> Gather<'_, N> {
             .iter()
             .enumerate()
         {
-            let area = self.absorbing_area_m2(row / 2, row % 2);
+            let area = self.counted_area_m2(row / 2, row % 2);
             for k in 0..N {
                 sum[k] += area[k] * lane[k].abs();
             }

@@ -11,6 +11,9 @@ use crate::world::World;
 /// Elements that are worked off as one task; a fixed number, so that sums have a fixed order.
 const TASK: usize = 512;
 
+/// Least part of an irradiance that counts when changes are judged.
+const LEAST_COUNTED: f64 = 0.1;
+
 /// What a material does, per band of the group.
 #[derive(Clone, Copy, Debug)]
 struct Scatter<const N: usize> {
@@ -106,7 +109,8 @@ impl<'a, const N: usize> Gather<'a, N> {
     /// `into.irradiance += omega * (E0 + F radiosity of the other half - into.irradiance)`, and the
     /// radiosities that follow. A row without lines in this half takes the irradiance of the other.
     ///
-    /// Returns how much the absorbed power changed, per band, summed without regard to sign, W.
+    /// Returns how much the absorbed power changed, per band, summed without regard to sign, W (see
+    /// [`Self::counted_area_m2`]).
     pub(super) fn sweep(
         &self,
         half: usize,
@@ -148,7 +152,7 @@ impl<'a, const N: usize> Gather<'a, N> {
                     let (lower, low_step) = relaxed(2 * element + 1, &pair[1]);
                     (pair[0], pair[1]) = (upper, lower);
                     let [up_area, low_area] =
-                        [0, 1].map(|side| self.absorbing_area_m2(element, side));
+                        [0, 1].map(|side| self.counted_area_m2(element, side));
                     for b in 0..N {
                         change[b] +=
                             up_area[b] * up_step[b].abs() + low_area[b] * low_step[b].abs();
@@ -170,7 +174,8 @@ impl<'a, const N: usize> Gather<'a, N> {
                     let (new, step) = relaxed(faces + task * TASK + k, e);
                     *e = new;
                     for b in 0..N {
-                        change[b] += area * (1.0 - self.soil_albedo[b]) * step[b].abs();
+                        change[b] +=
+                            area * (1.0 - self.soil_albedo[b]).max(LEAST_COUNTED) * step[b].abs();
                         out[b] = self.soil_albedo[b] * new[b];
                     }
                 }
@@ -199,8 +204,10 @@ impl<'a, const N: usize> Gather<'a, N> {
         });
     }
 
-    /// Area that is not buried, times absorptance of a face, m², per band.
-    pub(super) fn absorbing_area_m2(&self, element: usize, side: usize) -> Lane<N> {
+    /// What a change of irradiance of a face is multiplied with to be judged, m²: its area that is not
+    /// buried, times its absorptance. A face that absorbs next to nothing counts for a tenth of its area,
+    /// since what it scatters ends somewhere.
+    pub(super) fn counted_area_m2(&self, element: usize, side: usize) -> Lane<N> {
         let m = &self.materials[self.material_of_element[element] as usize];
         let absorbed = if side == 0 {
             &m.absorbed_upper
@@ -208,7 +215,7 @@ impl<'a, const N: usize> Gather<'a, N> {
             &m.absorbed_lower
         };
         let area = self.world.elements.area_m2[element] * self.outlook.exposed[2 * element + side];
-        absorbed.map(|a| a * area)
+        absorbed.map(|a| a.max(LEAST_COUNTED) * area)
     }
 
     /// What the upper and the lower face of an element send out (DESIGN: section 2).
