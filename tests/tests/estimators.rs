@@ -52,7 +52,7 @@ fn solved(problem: &Problem, estimator: Estimator, rays: f64) -> Finished {
 
 #[test]
 fn lines_and_rays_agree() {
-    for (name, problem, rays) in [("maize", maize(), 64.0), ("discs", discs(), 256.0)] {
+    for (name, problem, rays) in [("maize", maize(), 128.0), ("discs", discs(), 512.0)] {
         let lines = solved(&problem, Estimator::Lines, 0.0).solution;
         let rays = solved(&problem, Estimator::Rays, rays).solution;
         let (mut beyond, mut organs) = (0, 0);
