@@ -149,7 +149,7 @@ fn solid(problem: &Problem, traced: &Traced, organ: usize) -> bool {
 #[test]
 fn stated_errors_are_true() {
     const SEEDS: u64 = 20;
-    let problem = maize();
+    let problem = discs();
     let (organs, bands) = (problem.scene.organs.len(), problem.bands.len());
     let runs: Vec<Finished> = (1..=SEEDS)
         .map(|seed| {
