@@ -153,7 +153,7 @@ impl Parts<'_> {
         }
         let [up, scattered_down] = self.solved(b).map_or([0.0; 2], |k| self.escaped_W(band, k));
         let down = scattered_down + self.direct.passed_W[b];
-        let incoming = self.direct.incoming_W[b] + self.from_outer_soil_W(b);
+        let incoming = self.direct.incoming_W[b] + self.outer_soil_W(b);
         let variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
         let estimate = |value: f64, k: usize| Estimate {
             value,
@@ -171,7 +171,7 @@ impl Parts<'_> {
     }
 
     /// Power that the soil beyond the map of an open scene sends to what is on it, W.
-    fn from_outer_soil_W(&self, b: usize) -> f64 {
+    fn outer_soil_W(&self, b: usize) -> f64 {
         if self.world.extent.periodic || self.world.soil.is_none() || self.solved(b).is_none() {
             return 0.0;
         }

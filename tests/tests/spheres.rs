@@ -71,8 +71,11 @@ fn a_growing_sphere_comes_ever_closer_to_plain_radiosity() {
                 error <= last.max(0.003),
                 "band {band}, D = {diameter} m: {error}"
             );
+            // the far field is a mean field: with R = 0.1 m it is off by 2.4 to 3.8 % of an organ's NIR
+            // even when it is exact (DESIGN, section 3)
+            let mean_field = if diameter < 0.5 { 0.04 } else { 0.02 };
             assert!(
-                closure.abs() < 0.02,
+                closure.abs() < mean_field,
                 "band {band}, D = {diameter} m: closure {closure}"
             );
             last = error;

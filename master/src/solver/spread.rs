@@ -164,15 +164,12 @@ impl Spread<'_> {
             add(&mut balance[usize::from(soil_triangle[t])], 1.0, &absorbed);
             sum.triangle_W2[t] += variance(&absorbed);
         }
-        for row in 2 * elements..self.system.world.rows() {
+        for (cell, pull) in change[2 * elements..].iter().enumerate() {
+            let row = 2 * elements + cell;
             let area = self.exposed_area_m2(row);
-            add(
-                &mut balance[1],
-                (1.0 - band.soil_albedo) * area,
-                &change[row],
-            );
-            self.escape(&mut balance, row, band.soil_albedo * area, &change[row]);
-            sum.soil_W2_m4[row - 2 * elements] += variance(&change[row]);
+            add(&mut balance[1], (1.0 - band.soil_albedo) * area, pull);
+            self.escape(&mut balance, row, band.soil_albedo * area, pull);
+            sum.soil_W2_m4[cell] += variance(pull);
         }
         if !far.is_empty() {
             // what leaves the scene crosses its top and bottom levels
