@@ -45,10 +45,15 @@ fn flows(balance: &[Balance]) -> Vec<Flow> {
     flows.extend(
         only_where_there_is_some
             .into_iter()
-            .filter(|(_, flow)| balance.iter().any(|b| flow(b) != Estimate::default())),
+            .filter(|(_, flow)| balance.iter().any(|b| matters(flow(b), b.incoming_W))),
     );
     flows.extend([reflected, ("closure", |b: &Balance| b.closure_W)]);
     flows
+}
+
+/// More than what rounding leaves.
+fn matters(flow: Estimate, incoming_W: f64) -> bool {
+    flow.value.abs().max(flow.se) > 1e-9 * incoming_W
 }
 
 fn write_balance(out: &mut impl Write, scene: &Scene, balance: &[Balance]) -> io::Result<()> {
