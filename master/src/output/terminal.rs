@@ -51,9 +51,9 @@ fn flows(balance: &[Balance]) -> Vec<Flow> {
     flows
 }
 
-/// More than what rounding leaves.
+/// More than five digits of the light that comes in could show.
 fn matters(flow: Estimate, incoming_W: f64) -> bool {
-    flow.value.abs().max(flow.se) > 1e-9 * incoming_W
+    flow.value.abs().max(flow.se) > 1e-5 * incoming_W
 }
 
 fn write_balance(out: &mut impl Write, scene: &Scene, balance: &[Balance]) -> io::Result<()> {
