@@ -41,18 +41,22 @@ fn bands(problem: &Problem, plan: &Plan) -> String {
             .map(|b| problem.bands[b].name.as_str())
             .collect()
     };
-    let list = |names: Vec<&str>| {
-        if names.is_empty() {
-            "none".to_owned()
-        } else {
-            names.join(", ")
+    match (names(true), names(false)) {
+        (scatter, black) if black.is_empty() => format!("bands: {} scatter", scatter.join(", ")),
+        (scatter, black) if scatter.is_empty() => {
+            format!(
+                "bands: {} black or unlit, so direct light only",
+                black.join(", ")
+            )
         }
-    };
-    format!(
-        "bands: {} scatter; {} black or unlit, so direct light only",
-        list(names(true)),
-        list(names(false))
-    )
+        (scatter, black) => {
+            format!(
+                "bands: {} scatter; {} black or unlit, so direct light only",
+                scatter.join(", "),
+                black.join(", ")
+            )
+        }
+    }
 }
 
 fn exchange(settings: &Settings, plan: &Plan) -> String {
