@@ -71,8 +71,9 @@ fn a_growing_sphere_comes_ever_closer_to_plain_radiosity() {
                 error <= last.max(0.003),
                 "band {band}, D = {diameter} m: {error}"
             );
-            // the far field is a mean field: with R = 0.1 m it is off by 2.4 to 3.8 % of an organ's NIR
-            // even when it is exact (DESIGN, section 3)
+            // 0.0259 was measured in NIR at D = 0.2 m: the stated errors leave the far field's model out.
+            // The design's table for R = 0.1 m (2.4 to 3.8 %) is of organs, not of the balance, so this
+            // bound is what the model does today and not what theory asks for.
             let mean_field = if diameter < 0.5 { 0.04 } else { 0.02 };
             assert!(
                 closure.abs() < mean_field,

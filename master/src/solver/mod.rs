@@ -12,7 +12,8 @@
 //! both ways, has in multiple scattering, and every line still serves both its ends. All x depend on y
 //! alone and all y on x alone, so a pass is a parallel Gauss-Seidel sweep (a red-black one) with one
 //! result for any number of threads. The pair is 2-cyclic and consistently ordered, so Young's theory
-//! of over-relaxation holds exactly (Young 1971; Hageman & Young 1981, chapter 9).
+//! of over-relaxation applies where its eigenvalues are real (Young 1971; Hageman & Young 1981, chapter
+//! 9); see `relaxation` for where they are not.
 
 mod relaxation;
 mod spread;

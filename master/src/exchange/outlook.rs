@@ -1,0 +1,94 @@
+//! What the rows see that is not a radiosity to solve for: sky, void, soil beyond the map, burial.
+
+use rayon::prelude::*;
+
+use super::Exchange;
+use crate::world::World;
+
+/// What the rows see that is not a radiosity to solve for.
+#[derive(Clone, Debug, Default)]
+pub struct Outlook {
+    /// One over the number of lines of a row that count, in each half; 0 for a row without.
+    pub weight: [Vec<f64>; 2],
+    /// The part of each row that is not buried in something solid.
+    pub exposed: Vec<f64>,
+    /// The part of what each row sends out that leaves to the sky, by the lines of each half.
+    pub to_sky: [Vec<f64>; 2],
+    /// The part that leaves downwards, or to the soil beyond the map.
+    pub to_void: [Vec<f64>; 2],
+    /// The part of what each row sees that is soil beyond the map of an open scene.
+    pub outer_soil: Vec<f64>,
+}
+
+impl Exchange {
+    /// Counts what is seen by each row.
+    pub fn outlook(&self, world: &World) -> Outlook {
+        let half = self.batches.len() / 2;
+        let seen: Vec<[Seen; 2]> = (0..world.rows())
+            .into_par_iter()
+            .map(|row| {
+                let mut seen = [Seen::default(); 2];
+                for (k, batch) in self.batches.iter().enumerate() {
+                    seen[usize::from(k >= half)].count(world, batch.row(row));
+                }
+                seen
+            })
+            .collect();
+        let per = |part: usize, of: usize| {
+            if of == 0 {
+                0.0
+            } else {
+                part as f64 / of as f64
+            }
+        };
+        let exposed = |[a, b]: &[Seen; 2]| match (a.counted + b.counted, a.buried + b.buried) {
+            (_, 0) => 1.0,
+            (counted, buried) => per(counted, counted + buried),
+        };
+        // a row without lines in a half is judged by those of the other
+        let part = |of: fn(&Seen) -> usize| {
+            [0, 1].map(|h: usize| {
+                let judge = |s: &[Seen; 2]| if s[h].counted > 0 { s[h] } else { s[1 - h] };
+                seen.iter()
+                    .map(|s| per(of(&judge(s)), judge(s).counted))
+                    .collect::<Vec<f64>>()
+            })
+        };
+        Outlook {
+            weight: [0, 1].map(|h: usize| seen.iter().map(|s| per(1, s[h].counted)).collect()),
+            exposed: seen.iter().map(exposed).collect(),
+            to_sky: part(|s| s.sky),
+            to_void: part(|s| s.void),
+            outer_soil: seen
+                .iter()
+                .map(|[a, b]| per(a.outer + b.outer, a.counted + b.counted))
+                .collect(),
+        }
+    }
+}
+
+/// Lines of a row in one half, by what they see.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// All that are not buried.
+    counted: usize,
+    buried: usize,
+    sky: usize,
+    void: usize,
+    outer: usize,
+}
+
+impl Seen {
+    fn count(&mut self, world: &World, row: &[u32]) {
+        let ends = &world.ends;
+        for &end in row {
+            let buried = end == ends.buried();
+            self.buried += usize::from(buried);
+            self.counted += usize::from(!buried);
+            self.sky += usize::from(end == ends.sky());
+            let outer = end == ends.outer_soil();
+            self.outer += usize::from(outer);
+            self.void += usize::from(outer || end == ends.void());
+        }
+    }
+}
