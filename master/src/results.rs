@@ -175,13 +175,7 @@ impl Parts<'_> {
         if self.world.extent.periodic || self.world.soil.is_none() || self.solved(b).is_none() {
             return 0.0;
         }
-        let incoming: f64 = self
-            .problem
-            .sources
-            .iter()
-            .map(|s| s.irradiance_W_m2[b])
-            .sum();
-        let radiosity = self.problem.bands[b].soil_albedo * incoming;
+        let radiosity = world::outer_soil_radiosity_W_m2(self.problem, b);
         let seen_m2 = |row: usize| {
             self.world.row_area_m2(row as u32)
                 * self.outlook.exposed[row]

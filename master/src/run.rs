@@ -12,7 +12,7 @@ use crate::plan::Plan;
 use crate::results::Parts;
 use crate::solution::Solution;
 use crate::solver::{Irradiance, SolveError, System};
-use crate::world::World;
+use crate::world::{World, outer_soil_radiosity_W_m2};
 
 /// What a solve gives, and what it took.
 #[derive(Clone, Debug)]
@@ -125,9 +125,8 @@ fn fixed(problem: &Problem, world: &World, plan: &Plan) -> Vec<f64> {
     let mut fixed = vec![0.0; (world.ends.len() - world.rows()) * bands];
     let at = |end: u32| (end - world.ends.rows()) as usize * bands;
     if world.soil.is_some() && !world.extent.periodic {
-        for (b, band) in problem.bands.iter().enumerate() {
-            let incoming: f64 = problem.sources.iter().map(|s| s.irradiance_W_m2[b]).sum();
-            fixed[at(world.ends.outer_soil()) + b] = band.soil_albedo * incoming;
+        for b in 0..bands {
+            fixed[at(world.ends.outer_soil()) + b] = outer_soil_radiosity_W_m2(problem, b);
         }
     }
     if let Some(resolution) = &plan.far_field {

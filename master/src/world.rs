@@ -6,6 +6,7 @@ use nestrad_common::elements::Elements;
 use nestrad_common::ends::Ends;
 use nestrad_common::geometry;
 use nestrad_common::lattice::{Extent, Soup};
+use nestrad_common::problem::Problem;
 use nestrad_common::scene::{Material, Scene};
 
 /// What stays the same for all stages of a solve.
@@ -162,6 +163,16 @@ impl World {
 
 /// Most soil cells along a side.
 const MOST_CELLS: u32 = 1 << 11;
+
+/// Radiosity of the unshaded soil beyond the map of an open scene, W m⁻².
+pub fn outer_soil_radiosity_W_m2(problem: &Problem, band: usize) -> f64 {
+    let incoming: f64 = problem
+        .sources
+        .iter()
+        .map(|s| s.irradiance_W_m2[band])
+        .sum();
+    problem.bands[band].soil_albedo * incoming
+}
 
 /// Whether each triangle is soil.
 pub fn is_soil(scene: &Scene) -> Vec<bool> {
