@@ -46,22 +46,21 @@ impl Traced {
     }
 
     /// Part of the light that leaves `rows` (evenly over their area) for ends of which `hits` holds,
-    /// over a range of batches. Its standard error is from the batches: each is an independent
+    /// over the batches of some halves. Its standard error is from the batches: each is an independent
     /// estimate (linearised ratio estimator; Cochran 1977, section 2.11).
     pub fn part_seen(
         &self,
         rows: &[usize],
-        batches: std::ops::Range<usize>,
+        halves: &[usize],
         hits: impl Fn(u32) -> bool,
     ) -> Estimate {
-        let batches = &self.exchange.batches[batches];
-        let mut pulls = vec![0.0; batches.len()];
+        let mut pulls: Vec<f64> = Vec::new();
         let (mut sum, mut area) = (0.0, 0.0);
         for &row in rows {
-            let counts: Vec<(f64, f64)> = batches
+            let counts: Vec<(f64, f64)> = halves
                 .iter()
-                .map(|batch| {
-                    let ends = batch.row(row);
+                .flat_map(|&half| self.exchange.halves[half].by_batch(row))
+                .map(|ends| {
                     let seen = ends.iter().filter(|&&end| hits(end)).count();
                     (seen as f64, ends.len() as f64)
                 })
@@ -72,6 +71,7 @@ impl Traced {
             let row_area = self.world.row_area_m2(row as u32);
             sum += row_area * seen / all;
             area += row_area;
+            pulls.resize(counts.len(), 0.0);
             for (pull, (s, n)) in pulls.iter_mut().zip(counts) {
                 *pull += row_area * (s - seen / all * n) / all;
             }
@@ -86,8 +86,7 @@ impl Traced {
 
     /// Form factor from a side of an organ to a side of another one, over all batches.
     pub fn form_factor(&self, from: (usize, Side), to: (usize, Side)) -> Estimate {
-        let all = 0..self.exchange.batches.len();
-        self.part_seen(&self.rows(from.0, from.1), all, |end| {
+        self.part_seen(&self.rows(from.0, from.1), &[0, 1], |end| {
             self.is(end, to.0, to.1)
         })
     }

@@ -96,7 +96,6 @@ fn exchange_of_two_organs_is_mutual() {
         nestrad_common::ends::Side::Upper,
         nestrad_common::ends::Side::Lower,
     ];
-    let half = sampling.batches as usize / 2;
     let (mut z, mut beyond) = (Vec::new(), 0);
     for i in 0..organs {
         for j in 0..i {
@@ -110,8 +109,8 @@ fn exchange_of_two_organs_is_mutual() {
                         .map(|&r| traced.world.row_area_m2(r as u32))
                         .sum()
                 };
-                let there = traced.part_seen(&from, 0..half, |end| traced.is(end, j, t));
-                let back = traced.part_seen(&to, half..2 * half, |end| traced.is(end, i, s));
+                let there = traced.part_seen(&from, &[0], |end| traced.is(end, j, t));
+                let back = traced.part_seen(&to, &[1], |end| traced.is(end, i, s));
                 let (a, b) = (area(&from), area(&to));
                 let se = (a * there.se).hypot(b * back.se);
                 // a few lines have no normal distribution

@@ -92,7 +92,7 @@ fn one_job_and_many_give_the_same_bits() {
     let of = |blocks: &[BlockOf]| {
         trace_here(&problem.scene, &world, blocks, &sampling, || {})
             .unwrap()
-            .batches
+            .halves
     };
     assert!(of(&[whole]) == of(&parts), "rows differ");
 }

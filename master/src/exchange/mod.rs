@@ -13,8 +13,8 @@ use thiserror::Error;
 use crate::world::World;
 pub use jobs::{BlockOf, batch_message, batch_of_lines, block_message, world_message};
 pub use outlook::Outlook;
-pub use rows::BatchRows;
 use rows::put_together;
+pub use rows::{BatchRows, HalfRows};
 
 /// How densely the exchange is sampled.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -62,8 +62,8 @@ impl Sampling {
 /// All batches, and what it took to trace them.
 #[derive(Clone, Debug, Default)]
 pub struct Exchange {
-    /// In order; the first half of them carries light one way, the second half the other way.
-    pub batches: Vec<BatchRows>,
+    /// The first half of the batches carries light one way, the second half the other way.
+    pub halves: [HalfRows; 2],
     /// Lines, segments between hits, rays.
     pub counters: Traced,
 }
@@ -122,6 +122,7 @@ pub fn trace_here(
             done();
         }
     }
+    let mut batches = Vec::with_capacity(of_batch.len());
     for (index, parts) in of_batch.into_iter().enumerate() {
         for (_, rows) in &parts {
             exchange.counters.lines += rows.lines;
@@ -129,9 +130,12 @@ pub fn trace_here(
             exchange.counters.rays += rows.rays;
             exchange.counters.row_entries += rows.ends.len() as u64;
         }
-        exchange
-            .batches
-            .push(put_together(world, index as u32, parts)?);
+        batches.push(put_together(world, index as u32, parts)?);
     }
+    // each half's batches are freed before the other half is joined
+    let second = batches.split_off(batches.len() / 2);
+    exchange.halves[0] = HalfRows::join(&batches);
+    drop(batches);
+    exchange.halves[1] = HalfRows::join(&second);
     Ok(exchange)
 }

@@ -23,16 +23,9 @@ pub struct Outlook {
 impl Exchange {
     /// Counts what is seen by each row.
     pub fn outlook(&self, world: &World) -> Outlook {
-        let half = self.batches.len() / 2;
         let seen: Vec<[Seen; 2]> = (0..world.rows())
             .into_par_iter()
-            .map(|row| {
-                let mut seen = [Seen::default(); 2];
-                for (k, batch) in self.batches.iter().enumerate() {
-                    seen[usize::from(k >= half)].count(world, batch.row(row));
-                }
-                seen
-            })
+            .map(|row| [0, 1].map(|h: usize| Seen::of(world, self.halves[h].row(row))))
             .collect();
         let per = |part: usize, of: usize| {
             if of == 0 {
@@ -79,16 +72,17 @@ struct Seen {
 }
 
 impl Seen {
-    fn count(&mut self, world: &World, row: &[u32]) {
-        let ends = &world.ends;
+    fn of(world: &World, row: &[u32]) -> Self {
+        let (ends, mut seen) = (&world.ends, Self::default());
         for &end in row {
             let buried = end == ends.buried();
-            self.buried += usize::from(buried);
-            self.counted += usize::from(!buried);
-            self.sky += usize::from(end == ends.sky());
+            seen.buried += usize::from(buried);
+            seen.counted += usize::from(!buried);
+            seen.sky += usize::from(end == ends.sky());
             let outer = end == ends.outer_soil();
-            self.outer += usize::from(outer);
-            self.void += usize::from(outer || end == ends.void());
+            seen.outer += usize::from(outer);
+            seen.void += usize::from(outer || end == ends.void());
         }
+        seen
     }
 }

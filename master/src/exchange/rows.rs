@@ -1,6 +1,7 @@
 //! Rows of the exchange, and how those of a batch's blocks are joined.
 
 use nestrad_proto::v1;
+use rayon::prelude::*;
 
 use super::ExchangeError;
 use super::jobs::BlockOf;
@@ -32,6 +33,86 @@ impl BatchRows {
     #[inline]
     pub fn row(&self, row: usize) -> &[u32] {
         &self.ends[self.start[row] as usize..self.start[row + 1] as usize]
+    }
+}
+
+/// The rows of all batches of a half, joined: a sweep reads each row as one list.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct HalfRows {
+    /// Number of batches.
+    batches: usize,
+    /// Start of each row in `ends`, and the length of `ends` at the end.
+    start: Vec<u64>,
+    /// Where the entries of each batch end in a row, from the row's start: `row * batches + batch`.
+    batch_end: Vec<u32>,
+    /// What is seen, one entry per line or ray; by row, then by batch.
+    ends: Vec<u32>,
+}
+
+/// Rows that are joined as one task.
+const JOINED_AT_ONCE: usize = 4096;
+
+impl HalfRows {
+    /// Joins the batches of a half.
+    pub fn join(batches: &[BatchRows]) -> Self {
+        let rows = batches.first().map_or(0, |b| b.start.len() - 1);
+        let (mut start, mut batch_end) = (vec![0], Vec::with_capacity(rows * batches.len()));
+        let mut total = 0;
+        for row in 0..rows {
+            let mut end = 0;
+            for batch in batches {
+                end += batch.start[row + 1] - batch.start[row];
+                batch_end.push(end);
+            }
+            total += u64::from(end);
+            start.push(total);
+        }
+        let mut ends = vec![0; total as usize];
+        let mut parts = Vec::with_capacity(rows.div_ceil(JOINED_AT_ONCE));
+        let mut rest = &mut ends[..];
+        for first in (0..rows).step_by(JOINED_AT_ONCE) {
+            let last = (first + JOINED_AT_ONCE).min(rows);
+            let (part, left) = rest.split_at_mut((start[last] - start[first]) as usize);
+            parts.push((first..last, part));
+            rest = left;
+        }
+        parts.into_par_iter().for_each(|(rows, mut part)| {
+            for row in rows {
+                for batch in batches {
+                    let entries = batch.row(row);
+                    let (to, left) = part.split_at_mut(entries.len());
+                    to.copy_from_slice(entries);
+                    part = left;
+                }
+            }
+        });
+        Self {
+            batches: batches.len(),
+            start,
+            batch_end,
+            ends,
+        }
+    }
+
+    /// What a row sees.
+    #[inline]
+    pub fn row(&self, row: usize) -> &[u32] {
+        &self.ends[self.start[row] as usize..self.start[row + 1] as usize]
+    }
+
+    /// What a row sees in each batch, in order.
+    pub fn by_batch(&self, row: usize) -> impl Iterator<Item = &[u32]> {
+        let entries = self.row(row);
+        let end = &self.batch_end[row * self.batches..(row + 1) * self.batches];
+        (0..self.batches).map(move |g| {
+            let first = if g == 0 { 0 } else { end[g - 1] };
+            &entries[first as usize..end[g] as usize]
+        })
+    }
+
+    /// Number of entries of all rows.
+    pub fn entries(&self) -> u64 {
+        self.ends.len() as u64
     }
 }
 

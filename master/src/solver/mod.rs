@@ -176,8 +176,7 @@ impl Group<'_> {
             *lane = lane.map(|e| if exposed > 0.0 { e / exposed } else { 0.0 });
         }
         let fixed = lanes(self.system.fixed_W_m2);
-        let batches = &self.system.exchange.batches;
-        let (a, b) = batches.split_at(batches.len() / 2);
+        let halves = &self.system.exchange.halves;
         let mut x = gather.start(direct.clone(), &fixed);
         let mut y = gather.start(direct.clone(), &fixed);
 
@@ -186,8 +185,8 @@ impl Group<'_> {
         let mut passes = 0;
         while passes < self.tolerance.most_passes {
             let omega = relaxation.map(|r| r.omega);
-            let from_a = gather.sweep(0, a, &y, &direct, &omega, &mut x);
-            let from_b = gather.sweep(1, b, &x, &direct, &omega, &mut y);
+            let from_a = gather.sweep(0, &halves[0], &y, &direct, &omega, &mut x);
+            let from_b = gather.sweep(1, &halves[1], &x, &direct, &omega, &mut y);
             passes += 1;
             for (k, left) in left.iter_mut().enumerate() {
                 let incoming = self.system.incoming_W[self.bands[k]].max(f64::MIN_POSITIVE);
@@ -230,7 +229,7 @@ impl Group<'_> {
             let spread = Spread {
                 system: self.system,
                 band,
-                halves: [a, b],
+                halves,
             };
             for (half, seen) in [&y, &x].into_iter().enumerate() {
                 let seen: Vec<f64> = seen.radiosity.iter().map(|lane| lane[k]).collect();

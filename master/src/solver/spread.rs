@@ -12,7 +12,7 @@ use rayon::prelude::*;
 
 use super::sweep::Gather;
 use super::{HALF_BATCHES, Lane, System};
-use crate::exchange::BatchRows;
+use crate::exchange::HalfRows;
 use crate::far_field::closure::flux_weight;
 use crate::world;
 
@@ -38,7 +38,7 @@ pub(super) struct Spread<'a> {
     /// Number of the band.
     pub(super) band: usize,
     /// The halves of the exchange.
-    pub(super) halves: [&'a [BatchRows]; 2],
+    pub(super) halves: &'a [HalfRows; 2],
 }
 
 /// What a pull does to irradiances and to the radiosities of the far ends.
@@ -65,15 +65,15 @@ impl Spread<'_> {
     /// How each batch of a half pulls the irradiance of each row.
     fn pulls(&self, half: usize, seen: &[f64]) -> Vec<Pull> {
         let buried = self.system.world.ends.buried();
-        let batches = self.halves[half];
+        let rows = &self.halves[half];
         let weights = &self.system.outlook.weight[half];
         (0..self.system.world.rows())
             .into_par_iter()
             .with_min_len(1024)
             .map(|row| {
                 let (mut sums, mut counts) = ([0.0; HALF_BATCHES], [0usize; HALF_BATCHES]);
-                for (g, batch) in batches.iter().enumerate() {
-                    for &end in batch.row(row) {
+                for (g, entries) in rows.by_batch(row).enumerate() {
+                    for &end in entries {
                         sums[g] += seen[end as usize];
                         counts[g] += usize::from(end != buried);
                     }
@@ -106,14 +106,21 @@ impl Spread<'_> {
             let change = if step % 2 == 0 {
                 gather.sweep(
                     1 - half,
-                    self.halves[1 - half],
+                    &self.halves[1 - half],
                     &pulled,
                     &none,
                     &omega,
                     &mut other,
                 )
             } else {
-                gather.sweep(half, self.halves[half], &other, &pulls, &omega, &mut pulled)
+                gather.sweep(
+                    half,
+                    &self.halves[half],
+                    &other,
+                    &pulls,
+                    &omega,
+                    &mut pulled,
+                )
             };
             if (0..HALF_BATCHES).all(|g| change[g] <= FOLLOWED * first[g]) {
                 break;

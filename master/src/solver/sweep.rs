@@ -4,7 +4,7 @@ use nestrad_common::problem::Problem;
 use rayon::prelude::*;
 
 use super::Lane;
-use crate::exchange::{BatchRows, Outlook};
+use crate::exchange::{HalfRows, Outlook};
 use crate::far_field::closure::FarRows;
 use crate::world::World;
 
@@ -114,7 +114,7 @@ impl<'a, const N: usize> Gather<'a, N> {
     pub(super) fn sweep(
         &self,
         half: usize,
-        batches: &[BatchRows],
+        rows_of_half: &HalfRows,
         other: &Half<N>,
         direct: &[Lane<N>],
         omega: &Lane<N>,
@@ -128,7 +128,7 @@ impl<'a, const N: usize> Gather<'a, N> {
         let relaxed = |row: usize, old: &Lane<N>| -> (Lane<N>, Lane<N>) {
             let weight = self.outlook.weight[half][row];
             let gathered = if weight > 0.0 {
-                let sum = gather(batches, &other.radiosity, row);
+                let sum = gather(rows_of_half.row(row), &other.radiosity);
                 std::array::from_fn(|k| direct[row][k] + sum[k] * weight)
             } else {
                 other.irradiance[row]
@@ -198,7 +198,7 @@ impl<'a, const N: usize> Gather<'a, N> {
             let ends = rows.row(row);
             // a level that no line passes keeps what it has
             if !ends.is_empty() {
-                let sum = gather(std::slice::from_ref(rows), near, row);
+                let sum = gather(ends, near);
                 *out = sum.map(|s| s / ends.len() as f64);
             }
         });
@@ -232,14 +232,12 @@ impl<'a, const N: usize> Gather<'a, N> {
 /// Sum of the radiosities of what a row sees: all lines weigh the same. What is buried is dark, and is
 /// not in the weight.
 #[inline]
-fn gather<const N: usize>(batches: &[BatchRows], seen: &[Lane<N>], row: usize) -> Lane<N> {
+fn gather<const N: usize>(row: &[u32], seen: &[Lane<N>]) -> Lane<N> {
     let mut sum = [0.0; N];
-    for batch in batches {
-        for &end in batch.row(row) {
-            let b = &seen[end as usize];
-            for k in 0..N {
-                sum[k] += b[k];
-            }
+    for &end in row {
+        let b = &seen[end as usize];
+        for k in 0..N {
+            sum[k] += b[k];
         }
     }
     sum
