@@ -9,5 +9,10 @@ pub mod v1 {
         missing_docs,
         reason = "generated: the .proto files document every field"
     )]
+    #![allow(clippy::all, reason = "generated")]
     include!(concat!(env!("OUT_DIR"), "/nestrad.v1.rs"));
 }
+
+/// All `.proto` files as an encoded `FileDescriptorSet`: what the reflection service shows, and what
+/// stubs in other languages can be made from.
+pub const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/descriptors.bin"));

@@ -7,6 +7,7 @@
 
 mod block;
 mod lines;
+mod part;
 mod rays;
 mod rows;
 

@@ -41,6 +41,7 @@ pub fn batch_message(sampling: &Sampling, index: u32) -> v1::Batch {
             least_samples: sampling.least_samples,
             batches_in_half: sampling.batches / 2,
             lines_per_m2: sampling.lines_per_m2(),
+            ..v1::Rays::default()
         }),
         ..batch_of_lines(
             numbers,
@@ -66,6 +67,7 @@ pub fn batch_of_lines(
             random_count: rng.random(),
             // every line weighs the same: a direction of larger weight has more of them
             line_area_m2: line_area_m2 / axis.weight,
+            ..v1::Lines::default()
         })
         .collect();
     v1::Batch {

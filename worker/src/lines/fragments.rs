@@ -7,6 +7,7 @@ use nestrad_common::elements;
 use nestrad_common::lattice::{Lattice, Projected, Strips};
 
 use crate::block::Block;
+use crate::part::Part;
 
 /// Where a line meets the block: depth along the line, local element, and which face it meets.
 ///
@@ -40,15 +41,25 @@ impl Hit {
 /// Lines in a strip: with some ten hits each, a strip's fragments fit a second-level cache.
 const LINES_IN_STRIP: usize = 1 << 14;
 
-/// Calls `line` with the hits of every line of the lattice, by rising depth; lines by rising number.
-pub(crate) fn for_each_line(block: &Block, lattice: &Lattice, mut line: impl FnMut(usize, &[Hit])) {
+/// Calls `line` with the hits of every line of a part of the lattice, by rising depth; lines by rising
+/// number. Returns the number of lines.
+pub(crate) fn for_each_line(
+    block: &Block,
+    lattice: &Lattice,
+    part: Part,
+    mut line: impl FnMut(usize, &[Hit]),
+) -> u64 {
     let strips = Strips::new(lattice, &block.soup, LINES_IN_STRIP);
     let mut strip = Strip::default();
-    for s in 0..strips.len() {
-        strip.draw(block, lattice, strips.rows(s), strips.triangles(s));
+    let mut lines = 0;
+    for s in part.of(strips.len() as usize) {
+        let rows = strips.rows(s as u32);
+        lines += u64::from(rows.end - rows.start) * u64::from(lattice.nx);
+        strip.draw(block, lattice, rows, strips.triangles(s as u32));
         strip.sort();
         strip.for_each_line(&mut line);
     }
+    lines
 }
 
 /// Fragments of one strip of the lattice; buffers are kept from strip to strip.

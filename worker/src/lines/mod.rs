@@ -12,6 +12,7 @@ use nestrad_proto::v1;
 use rayon::prelude::*;
 
 use crate::block::Block;
+use crate::part::Part;
 use crate::rows::{Pair, Traced};
 
 /// Traces the lines of a batch; directions in parallel, each on its own.
@@ -35,7 +36,7 @@ pub(crate) fn from_levels(block: &Block, batch: &v1::Batch) -> Vec<Pair> {
         let mut looks = Vec::new();
         if let Some(lattice) = lattice(block, lines).filter(|l| l.lines() > 0) {
             let levels = levels::Levels::new(block, &lattice);
-            fragments::for_each_line(block, &lattice, |line, hits| {
+            fragments::for_each_line(block, &lattice, part(lines), |line, hits| {
                 levels.along(line, hits, &mut looks);
             });
         }
@@ -60,14 +61,18 @@ fn lattice(block: &Block, lines: &v1::Lines) -> Option<Lattice> {
     ))
 }
 
+fn part(lines: &v1::Lines) -> Part {
+    Part::new(lines.part, lines.parts)
+}
+
 fn direction(block: &Block, lines: &v1::Lines) -> (u64, Vec<Pair>) {
     let mut pairs = Vec::new();
     let Some(lattice) = lattice(block, lines).filter(|l| l.lines() > 0) else {
         return (0, pairs);
     };
     let sight = sight::Sight::new(block, &lattice);
-    fragments::for_each_line(block, &lattice, |line, hits| {
+    let traced = fragments::for_each_line(block, &lattice, part(lines), |line, hits| {
         sight.along(line, hits, &mut pairs)
     });
-    (lattice.lines() as u64, pairs)
+    (traced, pairs)
 }

@@ -3,6 +3,8 @@
 
 mod tracer;
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 use nestrad_common::directions::{Purpose, stream};
 use nestrad_common::elements;
@@ -12,6 +14,7 @@ use rand_pcg::Pcg64Mcg;
 use rayon::prelude::*;
 
 use crate::block::Block;
+use crate::part::Part;
 use crate::rows::{Pair, Traced};
 use tracer::FaceRay;
 pub use tracer::Tracer;
@@ -26,19 +29,23 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced
         rays,
         batch: batch.index,
     };
-    let tasks = block.soup.triangles().len().div_ceil(TASK);
+    let part = Part::new(rays.part, rays.parts);
+    let triangles = part.of(block.soup.triangles().len());
+    let tasks = triangles.len().div_ceil(TASK);
     let looks: Vec<Vec<Pair>> = (0..tasks)
         .into_par_iter()
         .map(|task| {
             let mut looks = Vec::new();
-            for t in task * TASK..((task + 1) * TASK).min(block.soup.triangles().len()) {
+            let first = triangles.start + task * TASK;
+            for t in first..(first + TASK).min(triangles.end) {
                 from_triangle(block, tracer, &plan, t, &mut looks);
             }
             looks
         })
         .collect();
     traced.looks = looks.concat();
-    from_soil(block, tracer, &plan, &mut traced.looks);
+    let cells = part.of(block.ends.soil_cells as usize);
+    from_soil(block, tracer, &plan, cells, &mut traced.looks);
     traced.rays = traced.looks.len() as u64;
 }
 
@@ -104,9 +111,15 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
     }
 }
 
-fn from_soil(block: &Block, tracer: &Tracer, plan: &Plan, looks: &mut Vec<Pair>) {
+fn from_soil(
+    block: &Block,
+    tracer: &Tracer,
+    plan: &Plan,
+    cells: Range<usize>,
+    looks: &mut Vec<Pair>,
+) {
     let Some(soil) = &block.soil else { return };
-    for cell in 0..block.ends.soil_cells {
+    for cell in cells.start as u32..cells.end as u32 {
         let end = block.ends.soil(cell);
         let row = block.local(end);
         if !block.has_row(row) {
