@@ -1,7 +1,12 @@
-//! The messages that master and workers exchange, generated from `nestrad/v1/*.proto`, which
-//! documents them field by field.
+//! The messages that master, workers and clients exchange, generated from `nestrad/v1/*.proto`, which
+//! documents them field by field, and the channels that they travel on.
 
 #![allow(non_snake_case, reason = "units in names are written as units")]
+
+pub mod access;
+pub mod channel;
+pub mod guard;
+pub mod token;
 
 /// Version 1 of the protocol.
 pub mod v1 {
@@ -16,3 +21,9 @@ pub mod v1 {
 /// All `.proto` files as an encoded `FileDescriptorSet`: what the reflection service shows, and what
 /// stubs in other languages can be made from.
 pub const DESCRIPTORS: &[u8] = include_bytes!(concat!(env!("OUT_DIR"), "/descriptors.bin"));
+
+/// No message is larger than this, bytes.
+pub const MAX_MESSAGE_BYTES: usize = 8 << 20;
+
+/// The largest slice of something that travels in slices, bytes, about.
+pub const SLICE_BYTES: usize = 512 << 10;

@@ -1,0 +1,155 @@
+//! The door of a master: its certificate, who is let in, and where it may stand open.
+
+use std::net::SocketAddr;
+use std::path::PathBuf;
+
+use clap::Args;
+use thiserror::Error;
+use tonic::transport::server::Server;
+use tonic::transport::{Certificate, Identity, ServerTlsConfig};
+use tower::layer::util::{Identity as NoLayer, Stack};
+
+use crate::channel::{CONNECTION_WINDOW, KEEP_ALIVE, PemError, STREAM_WINDOW, pem};
+use crate::guard::Guard;
+use crate::token::{Token, TokenError};
+
+/// Streams of one connection at a time.
+const MAX_STREAMS: u32 = 256;
+
+/// Headers of a call, bytes.
+const MAX_HEADERS: u32 = 16 << 10;
+
+/// Who may call a master, and how it proves to be one.
+#[derive(Args, Clone, Debug, Default)]
+#[command(next_help_heading = "Access")]
+pub struct Access {
+    /// Certificate of this master, PEM: callers then use https
+    #[arg(long, value_name = "FILE", requires = "tls_key")]
+    pub tls_cert: Option<PathBuf>,
+
+    /// Private key of --tls-cert, PEM
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    pub tls_key: Option<PathBuf>,
+
+    /// Let in only callers with a certificate of this authority, PEM
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    pub client_ca: Option<PathBuf>,
+
+    /// File with the token of clients: who shows it may solve
+    #[arg(long, value_name = "FILE")]
+    pub client_token: Option<PathBuf>,
+
+    /// File with the token of workers: who shows it may compute for this master, and nothing else
+    #[arg(long, value_name = "FILE")]
+    pub worker_token: Option<PathBuf>,
+
+    /// Allow addresses that other machines reach without encryption
+    #[arg(long)]
+    pub allow_plaintext: bool,
+}
+
+/// A server with a guard before its services.
+pub type GuardedServer = Server<Stack<Guard, NoLayer>>;
+
+impl Access {
+    /// A server for `address` to which services can be added. Refused where other machines could read
+    /// along or come in without credentials.
+    pub fn server(&self, address: SocketAddr) -> Result<GuardedServer, AccessError> {
+        let guard = Guard {
+            client: self.client_token.as_deref().map(Token::read).transpose()?,
+            worker: self.worker_token.as_deref().map(Token::read).transpose()?,
+            certificate: self.client_ca.is_some(),
+        };
+        if !address.ip().is_loopback() {
+            if self.tls_cert.is_none() && !self.allow_plaintext {
+                return Err(AccessError::Plaintext { address });
+            }
+            if guard.client.is_none() && guard.worker.is_none() && !guard.certificate {
+                return Err(AccessError::Open { address });
+            }
+        }
+        let mut server = Server::builder()
+            .tcp_nodelay(true)
+            .http2_keepalive_interval(Some(KEEP_ALIVE))
+            .http2_keepalive_timeout(Some(KEEP_ALIVE))
+            .initial_stream_window_size(STREAM_WINDOW)
+            .initial_connection_window_size(CONNECTION_WINDOW)
+            .max_concurrent_streams(MAX_STREAMS)
+            .http2_max_header_list_size(MAX_HEADERS);
+        if let (Some(cert), Some(key)) = (&self.tls_cert, &self.tls_key) {
+            let mut setup =
+                ServerTlsConfig::new().identity(Identity::from_pem(pem(cert)?, pem(key)?));
+            if let Some(path) = &self.client_ca {
+                // health is answered without a certificate; the guard sees to the rest
+                setup = setup
+                    .client_ca_root(Certificate::from_pem(pem(path)?))
+                    .client_auth_optional(true);
+            }
+            server = server.tls_config(setup).map_err(AccessError::Tls)?;
+        }
+        Ok(server.layer(guard))
+    }
+}
+
+/// Why a master does not open its door.
+#[derive(Debug, Error)]
+pub enum AccessError {
+    /// Others could read along.
+    #[error(
+        "{address} is reached from other machines: expected --tls-cert and --tls-key, or --allow-plaintext"
+    )]
+    Plaintext {
+        /// Where it was to listen.
+        address: SocketAddr,
+    },
+    /// Anybody could come in.
+    #[error(
+        "{address} is reached from other machines: expected --client-token and --worker-token, or --client-ca"
+    )]
+    Open {
+        /// Where it was to listen.
+        address: SocketAddr,
+    },
+    /// A certificate or key cannot be used.
+    #[error(transparent)]
+    Pem(#[from] PemError),
+    /// A token cannot be used.
+    #[error(transparent)]
+    Token(#[from] TokenError),
+    /// Certificate and key do not make a TLS set-up.
+    #[error("certificates cannot be used")]
+    Tls(#[source] tonic::transport::Error),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn other_machines_need_encryption_and_credentials() {
+        let folder = tempfile::tempdir().unwrap();
+        let token = folder.path().join("token");
+        std::fs::write(&token, "0123456789abcdef").unwrap();
+        let loopback: SocketAddr = "127.0.0.1:0".parse().unwrap();
+        let any: SocketAddr = "0.0.0.0:7410".parse().unwrap();
+        let closed = Access::default();
+        assert!(closed.server(loopback).is_ok());
+        let refusal = |access: &Access| access.server(any).err().unwrap().to_string();
+        assert!(refusal(&closed).contains("--allow-plaintext"));
+        let plain = Access {
+            allow_plaintext: true,
+            ..Access::default()
+        };
+        assert!(refusal(&plain).contains("--client-token"));
+        let known = Access {
+            client_token: Some(token),
+            ..plain
+        };
+        assert!(known.server(any).is_ok());
+        let hidden = Access {
+            allow_plaintext: false,
+            ..known
+        };
+        assert!(refusal(&hidden).contains("0.0.0.0:7410"));
+    }
+}
