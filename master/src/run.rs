@@ -6,7 +6,7 @@ use thiserror::Error;
 use crate::direct::direct_light;
 use crate::exchange::{BlockOf, Exchange, ExchangeError, Outlook, Traced, trace_here};
 use crate::far_field::closure::{FarRows, from_layers};
-use crate::output::progress::Progress;
+use crate::output::progress::{Cancelled, Progress};
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
 use crate::results::Parts;
@@ -45,9 +45,12 @@ pub enum RunError {
     /// The solver did not converge.
     #[error(transparent)]
     Solve(#[from] SolveError),
+    /// It is not wanted any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
-/// Solves a problem as planned.
+/// Solves a problem as planned, or stops at the end of a step if `progress` is told so.
 pub fn solve(
     problem: &Problem,
     plan: &Plan,
@@ -56,6 +59,8 @@ pub fn solve(
 ) -> Result<Finished, RunError> {
     let world = plan.world(problem);
     watch.lap("elements");
+    progress.check()?;
+    progress.stage("direct light", 0);
     let direct = direct_light(
         problem,
         &world,
@@ -63,6 +68,7 @@ pub fn solve(
         plan.seed,
     );
     watch.lap("direct light");
+    progress.check()?;
 
     let mut exchange = Exchange::default();
     let mut outlook = Outlook::default();
@@ -74,10 +80,13 @@ pub fn solve(
             &world,
             &[BlockOf::whole(&world)],
             sampling,
-            || progress.inc(1),
+            || {
+                progress.inc(1);
+                progress.check()
+            },
         )?;
-        progress.finish();
         watch.lap("exchange");
+        progress.stage("far field", 0);
         outlook = exchange.outlook(&world);
         let far = plan
             .far_field
@@ -86,6 +95,8 @@ pub fn solve(
             .map_err(ExchangeError::from)?;
         let fixed_W_m2 = fixed(problem, &world, plan);
         watch.lap("far field");
+        progress.check()?;
+        progress.stage("solve", 0);
         let system = System {
             problem,
             world: &world,
@@ -98,7 +109,9 @@ pub fn solve(
         };
         irradiance = system.solve(&plan.scattering_bands, &plan.tolerance)?;
         watch.lap("solve");
+        progress.check()?;
     }
+    progress.stage("results", 0);
     let parts = Parts {
         problem,
         world: &world,
@@ -109,6 +122,7 @@ pub fn solve(
     };
     let solution = parts.assemble();
     watch.lap("results");
+    progress.finish();
     let counters = Counters {
         elements: world.elements.len(),
         direct_lines: direct.lines,

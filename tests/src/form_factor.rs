@@ -20,7 +20,7 @@ impl Traced {
     pub fn new(problem: &Problem, max_edge_m: f64, sampling: &Sampling) -> Self {
         let world = World::new(&problem.scene, max_edge_m, 0.1, f64::INFINITY, (0, 0));
         let whole = [BlockOf::whole(&world)];
-        let exchange = trace_here(&problem.scene, &world, &whole, sampling, || {}).unwrap();
+        let exchange = trace_here(&problem.scene, &world, &whole, sampling, || Ok(())).unwrap();
         let organ = |&t: &u32| problem.scene.organ[t as usize] as usize;
         Self {
             organ_of_element: world.triangle_of_element.iter().map(organ).collect(),

@@ -90,7 +90,7 @@ fn one_job_and_many_give_the_same_bits() {
         })
         .collect();
     let of = |blocks: &[BlockOf]| {
-        trace_here(&problem.scene, &world, blocks, &sampling, || {})
+        trace_here(&problem.scene, &world, blocks, &sampling, || Ok(()))
             .unwrap()
             .halves
     };

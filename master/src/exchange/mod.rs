@@ -10,6 +10,7 @@ use nestrad_common::scene::Scene;
 use nestrad_proto::v1;
 use thiserror::Error;
 
+use crate::output::progress::Cancelled;
 use crate::world::World;
 pub use jobs::{BlockOf, batch_message, batch_of_lines, block_message, world_message};
 pub use outlook::Outlook;
@@ -99,15 +100,18 @@ pub enum ExchangeError {
         /// How many there should be.
         expected: usize,
     },
+    /// It is not wanted any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
 
-/// Traces all batches of all blocks in this process; `done` is called after each job.
+/// Traces all batches of all blocks in this process; `done` is called after each job, and may end it.
 pub fn trace_here(
     scene: &Scene,
     world: &World,
     blocks: &[BlockOf],
     sampling: &Sampling,
-    done: impl Fn() + Sync,
+    done: impl Fn() -> Result<(), Cancelled>,
 ) -> Result<Exchange, ExchangeError> {
     let mut exchange = Exchange::default();
     let mut of_batch: Vec<Vec<(&BlockOf, v1::Rows)>> =
@@ -119,7 +123,7 @@ pub fn trace_here(
             let batch = batch_message(sampling, index);
             let rows = nestrad_worker::trace(&geometry, &tracer, &batch);
             of_batch[index as usize].push((block, rows));
-            done();
+            done()?;
         }
     }
     let mut batches = Vec::with_capacity(of_batch.len());

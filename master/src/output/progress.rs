@@ -1,10 +1,12 @@
-//! Progress of long work, on the terminal.
+//! Progress of long work: on the terminal, or for whoever asks; and a way to stop the work.
 
 use std::io::IsTerminal;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use thiserror::Error;
 
 /// Work that is done sooner than this shows no bar.
 const PATIENCE: Duration = Duration::from_secs(1);
@@ -15,7 +17,24 @@ const PATIENCE: Duration = Duration::from_secs(1);
 pub struct Progress {
     visible: bool,
     stage: Mutex<Option<RunningStage>>,
+    cancelled: AtomicBool,
 }
+
+/// How far the running stage is.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct StageProgress {
+    /// Its name; empty between stages.
+    pub name: String,
+    /// Steps that are done.
+    pub done: u64,
+    /// Steps that it has; 0 where they are not counted.
+    pub total: u64,
+}
+
+/// Somebody wants the work no more.
+#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
+#[error("cancelled")]
+pub struct Cancelled;
 
 #[derive(Debug)]
 struct RunningStage {
@@ -32,10 +51,34 @@ impl Progress {
         Self {
             visible: !quiet && std::io::stderr().is_terminal(),
             stage: Mutex::new(None),
+            cancelled: AtomicBool::new(false),
         }
     }
 
-    /// Ends the running stage and begins one that consists of `total` steps.
+    /// Asks for the work to stop at its next step.
+    pub fn cancel(&self) {
+        self.cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// To be asked between steps: an error once [`Progress::cancel`] was called.
+    pub fn check(&self) -> Result<(), Cancelled> {
+        let cancelled = self.cancelled.load(Ordering::Relaxed);
+        if cancelled { Err(Cancelled) } else { Ok(()) }
+    }
+
+    /// How far the running stage is.
+    pub fn now(&self) -> StageProgress {
+        let stage = self.lock();
+        let stage = stage.as_ref().map(|stage| StageProgress {
+            name: stage.name.clone(),
+            done: stage.done.min(stage.total),
+            total: stage.total,
+        });
+        stage.unwrap_or_default()
+    }
+
+    /// Ends the running stage and begins one that consists of `total` steps, 0 where they are not
+    /// counted.
     pub fn stage(&self, name: &str, total: u64) {
         self.replace(Some(RunningStage {
             name: name.to_owned(),
@@ -49,11 +92,8 @@ impl Progress {
     /// `steps` more steps of the running stage are done. It takes a lock: call it for milliseconds
     /// of work, not for every ray.
     pub fn inc(&self, steps: u64) {
-        if !self.visible {
-            return;
-        }
         if let Some(stage) = &mut *self.lock() {
-            stage.advance(steps);
+            stage.advance(steps, self.visible);
         }
     }
 
@@ -82,9 +122,9 @@ impl Drop for Progress {
 }
 
 impl RunningStage {
-    fn advance(&mut self, steps: u64) {
+    fn advance(&mut self, steps: u64, visible: bool) {
         self.done = self.done.saturating_add(steps);
-        if self.bar.is_none() && self.begun.elapsed() >= PATIENCE {
+        if visible && self.bar.is_none() && self.begun.elapsed() >= PATIENCE {
             self.bar = Some(self.new_bar());
         }
         if let Some(bar) = &self.bar {
@@ -107,10 +147,9 @@ mod tests {
     use super::*;
 
     fn visible() -> Progress {
-        Progress {
-            visible: true,
-            stage: Mutex::new(None),
-        }
+        let mut progress = Progress::new(true);
+        progress.visible = true;
+        progress
     }
 
     #[test]
@@ -151,10 +190,29 @@ mod tests {
     }
 
     #[test]
-    fn quiet_is_silent() {
+    fn quiet_is_silent_but_answers() {
         let progress = Progress::new(true);
-        progress.stage("exchange", 1);
+        assert_eq!(progress.now(), StageProgress::default());
+        progress.stage("exchange", 2);
+        if let Some(stage) = &mut *progress.lock() {
+            stage.begun -= PATIENCE;
+        }
         progress.inc(1);
-        assert!(!progress.visible);
+        let now = progress.now();
+        assert_eq!((now.name.as_str(), now.done, now.total), ("exchange", 1, 2));
+        assert!(
+            progress
+                .lock()
+                .as_ref()
+                .is_some_and(|stage| stage.bar.is_none())
+        );
+    }
+
+    #[test]
+    fn work_that_is_not_wanted_is_told() {
+        let progress = Progress::new(true);
+        assert_eq!(progress.check(), Ok(()));
+        progress.cancel();
+        assert_eq!(progress.check(), Err(Cancelled));
     }
 }
