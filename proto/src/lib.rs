@@ -6,6 +6,7 @@
 pub mod access;
 pub mod channel;
 pub mod guard;
+pub mod packed;
 pub mod token;
 
 /// Version 1 of the protocol.

@@ -39,22 +39,22 @@ impl<'a> Sight<'a> {
     /// Adds the pairs along one line; `hits` by rising depth.
     pub(crate) fn along(&self, line: usize, hits: &[Hit], pairs: &mut Vec<Pair>) {
         let start = pairs.len();
-        self.neighbours(line, hits, pairs);
+        // what lies under the soil sees nothing and is not seen
+        let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
+        let hits = &hits[hits.partition_point(|h| h.depth() < soil_depth)..];
+        self.neighbours(line, hits, soil_depth, pairs);
         if hits.iter().any(|h| self.block.is_solid(h.face_along())) {
-            bury(self.block, pairs, start);
+            bury(self.block, hits, self.radius, pairs, start);
         }
     }
 
-    fn neighbours(&self, line: usize, hits: &[Hit], pairs: &mut Vec<Pair>) {
+    fn neighbours(&self, line: usize, hits: &[Hit], soil_depth: u32, pairs: &mut Vec<Pair>) {
         let bottom = match &self.soil {
             Some(soil) => soil
                 .cell(line)
                 .map_or(self.below, |c| self.block.local(self.block.ends.soil(c))),
             None => self.below,
         };
-        // what lies under the soil sees nothing and is not seen
-        let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
-        let hits = &hits[hits.partition_point(|h| h.depth() < soil_depth)..];
         let Some(radius) = self.radius else {
             let mut seen = bottom;
             for hit in hits {
