@@ -246,7 +246,10 @@ mod tests {
         ));
         assert!(matches!(
             check(&packed, 3, 5, 5),
-            Err(PackedFault::Count { what: "entries", .. })
+            Err(PackedFault::Count {
+                what: "entries",
+                ..
+            })
         ));
         assert_eq!(
             check(&packed, 3, 4, 4),

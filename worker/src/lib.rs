@@ -7,11 +7,13 @@
 
 mod block;
 mod lines;
+mod memory;
 mod part;
 mod rays;
 mod rows;
 
 pub use block::{Block, BlockFault};
+pub use memory::Demand;
 pub use rays::Tracer;
 
 use nestrad_proto::v1;

@@ -1,21 +1,30 @@
 //! The exchange matrix: batches of directions are cut into jobs, the worker's kernel computes them,
 //! and their rows are put together.
 
+mod assembly;
 mod jobs;
 mod outlook;
+mod partition;
 mod rows;
+mod split;
+
+use std::ops::AddAssign;
 
 use nestrad_common::directions::Axes;
 use nestrad_common::scene::Scene;
+use nestrad_proto::packed::PackedFault;
 use nestrad_proto::v1;
 use thiserror::Error;
 
 use crate::output::progress::Cancelled;
 use crate::world::World;
+pub use assembly::{Assembly, JobRows};
 pub use jobs::{BlockOf, batch_message, batch_of_lines, block_message, world_message};
 pub use outlook::Outlook;
+pub use partition::{SmallestWorker, partition};
 use rows::put_together;
 pub use rows::{BatchRows, HalfRows};
+pub use split::{JobOf, batches, demand, split};
 
 /// How densely the exchange is sampled.
 #[derive(Clone, Copy, Debug, PartialEq, serde::Serialize)]
@@ -69,6 +78,19 @@ pub struct Exchange {
     pub counters: Traced,
 }
 
+impl Exchange {
+    /// Joins all batches.
+    fn of_batches(mut batches: Vec<BatchRows>, counters: Traced) -> Self {
+        let mut halves = [HalfRows::default(), HalfRows::default()];
+        // each half's batches are freed before the other half is joined
+        let second = batches.split_off(batches.len() / 2);
+        halves[0] = HalfRows::join(&batches);
+        drop(batches);
+        halves[1] = HalfRows::join(&second);
+        Self { halves, counters }
+    }
+}
+
 /// What the kernel did.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
 pub struct Traced {
@@ -82,12 +104,37 @@ pub struct Traced {
     pub row_entries: u64,
 }
 
+impl AddAssign for Traced {
+    fn add_assign(&mut self, more: Self) {
+        self.lines += more.lines;
+        self.segments += more.segments;
+        self.rays += more.rays;
+        self.row_entries += more.row_entries;
+    }
+}
+
 /// Why the exchange could not be computed.
 #[derive(Debug, Error)]
 pub enum ExchangeError {
     /// The kernel refused a block.
     #[error("near-field job refused")]
     Block(#[from] nestrad_worker::BlockFault),
+    /// Packed rows cannot be read.
+    #[error("near-field result cannot be read")]
+    Packed(#[from] PackedFault),
+    /// No cut of the scene into blocks is small enough for a worker.
+    #[error(
+        "a worker needs {needed_GiB:.2} GiB for the smallest block of this scene, the smallest has \
+         {limit_GiB:.2}: give workers more memory{}", if *.bounded { "" } else { " or choose a --diameter" }
+    )]
+    BlockTooLarge {
+        /// What the smallest block that was tried takes.
+        needed_GiB: f64,
+        /// What a worker may take.
+        limit_GiB: f64,
+        /// Whether the near field has a bound.
+        bounded: bool,
+    },
     /// A result does not fit its job.
     #[error("near-field result of batch {batch} has {found} {what}, expected {expected}")]
     Result {
@@ -113,7 +160,6 @@ pub fn trace_here(
     sampling: &Sampling,
     done: impl Fn() -> Result<(), Cancelled>,
 ) -> Result<Exchange, ExchangeError> {
-    let mut exchange = Exchange::default();
     let mut of_batch: Vec<Vec<(&BlockOf, v1::Rows)>> =
         (0..sampling.batches).map(|_| Vec::new()).collect();
     for block in blocks {
@@ -126,20 +172,18 @@ pub fn trace_here(
             done()?;
         }
     }
+    let mut counters = Traced::default();
     let mut batches = Vec::with_capacity(of_batch.len());
     for (index, parts) in of_batch.into_iter().enumerate() {
         for (_, rows) in &parts {
-            exchange.counters.lines += rows.lines;
-            exchange.counters.segments += rows.segments;
-            exchange.counters.rays += rows.rays;
-            exchange.counters.row_entries += rows.ends.len() as u64;
+            counters += Traced {
+                lines: rows.lines,
+                segments: rows.segments,
+                rays: rows.rays,
+                row_entries: rows.ends.len() as u64,
+            };
         }
         batches.push(put_together(world, index as u32, parts)?);
     }
-    // each half's batches are freed before the other half is joined
-    let second = batches.split_off(batches.len() / 2);
-    exchange.halves[0] = HalfRows::join(&batches);
-    drop(batches);
-    exchange.halves[1] = HalfRows::join(&second);
-    Ok(exchange)
+    Ok(Exchange::of_batches(batches, counters))
 }

@@ -1,0 +1,216 @@
+//! Which jobs a solve is cut into: a block, a batch, and a range of the batch's lines or its rays.
+//!
+//! The cut depends on the scene and on how densely it is sampled alone, so that a job that was done
+//! before is known again, whoever asks and however many workers there are.
+
+use std::ops::Range;
+
+use nestrad_proto::v1;
+use nestrad_worker::Demand;
+
+use super::Sampling;
+use super::jobs::{BlockOf, batch_message};
+use crate::world::World;
+
+/// A job is cut so that one thread computes it in about this time, seconds: long against what it costs
+/// to hand it out, short against a solve.
+const JOB_S: f64 = 0.2;
+
+/// Most parts that the lattice of one direction, or the faces of a block, are cut into.
+const MOST_PARTS: f64 = 64.0;
+
+/// Seconds per triangle and direction, per segment, per lattice point, per row and job, per ray; measured
+/// on maize, one thread.
+const TRIANGLE_S: f64 = 25e-9;
+const SEGMENT_S: f64 = 60e-9;
+const LINE_S: f64 = 6e-9;
+const ROW_S: f64 = 4e-9;
+const RAY_S: f64 = 1e-6;
+
+/// What a worker computes at a time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct JobOf {
+    /// Index of its block.
+    pub block: usize,
+    /// Its batch.
+    pub batch: u32,
+    /// Directions of the batch.
+    pub lines: Range<usize>,
+    /// Which part of their lattices, of how many.
+    pub part: (u32, u32),
+    /// Which part of the batch's rays, of how many; `None` where it casts none.
+    pub rays: Option<(u32, u32)>,
+    /// What it is expected to take, seconds on one thread.
+    pub cost_s: f64,
+}
+
+impl JobOf {
+    /// The job as a message; `batch` is the whole of its batch.
+    pub fn message(&self, batch: &v1::Batch) -> v1::Batch {
+        let mut lines = batch.lines[self.lines.clone()].to_vec();
+        for line in &mut lines {
+            (line.part, line.parts) = self.part;
+        }
+        let rays = self.rays.and_then(|(part, parts)| {
+            batch.rays.map(|rays| v1::Rays {
+                part,
+                parts,
+                ..rays
+            })
+        });
+        v1::Batch {
+            index: batch.index,
+            lines,
+            rays,
+        }
+    }
+}
+
+/// The jobs of all blocks and batches: by batch, then by block, then in the order in which their rows are
+/// joined.
+pub fn split(
+    world: &World,
+    blocks: &[BlockOf],
+    batches: &[v1::Batch],
+    sampling: &Sampling,
+) -> Vec<JobOf> {
+    let sizes: Vec<Sizes> = blocks
+        .iter()
+        .map(|block| Sizes::of(world, block, sampling))
+        .collect();
+    let mut jobs = Vec::new();
+    for batch in batches {
+        for (block, sizes) in sizes.iter().enumerate() {
+            sizes.split(block, batch, world, &mut jobs);
+        }
+    }
+    jobs
+}
+
+/// All batches of a sampling, whole.
+pub fn batches(sampling: &Sampling) -> Vec<v1::Batch> {
+    (0..sampling.batches)
+        .map(|index| batch_message(sampling, index))
+        .collect()
+}
+
+/// What a block needs of a worker.
+pub fn demand(world: &World, block: &BlockOf, sampling: &Sampling) -> Demand {
+    let sizes = Sizes::of(world, block, sampling);
+    let direction_s = sizes.direction_s(world, sampling.line_area_m2, 1.0);
+    // a job of one direction in its parts, or of as many directions as fill its time
+    let most = f64::from(sampling.sets_per_batch * sampling.axes.count()).max(1.0);
+    let directions = (JOB_S / direction_s).clamp(1.0 / MOST_PARTS, most);
+    let entries = 2.0 * sizes.segments(world, sampling.line_area_m2, 1.0) * directions;
+    let entries = entries.max(JOB_S / RAY_S) as u64;
+    Demand {
+        entries,
+        ..sizes.demand
+    }
+}
+
+/// What the cost of a block's jobs depends on.
+struct Sizes {
+    demand: Demand,
+    area_m2: f64,
+    /// Rays of a batch.
+    rays: f64,
+}
+
+impl Sizes {
+    fn of(world: &World, block: &BlockOf, sampling: &Sampling) -> Self {
+        let elements = &world.elements;
+        let missing = |area_m2: f64| {
+            let missing = sampling.least_samples - area_m2 * sampling.lines_per_m2();
+            missing.max(0.0).ceil() / f64::from((sampling.batches / 2).max(1))
+        };
+        let mut demand = Demand {
+            triangles: block.triangles.len() as u64,
+            other_ends: (world.ends.len() - world.ends.faces() as usize) as u64,
+            rows: block.soil_cells.len() as u64,
+            ..Demand::default()
+        };
+        let soil_area_m2 = world.soil.map_or(0.0, |s| s.cell_area_m2());
+        let (mut area_m2, mut rays) = (0.0, missing(soil_area_m2) * demand.rows as f64);
+        for &(t, owned) in &block.triangles {
+            let pieces = elements.divisions[t as usize].pow(2);
+            let piece_m2 = elements.area_m2[elements.first[t as usize] as usize];
+            area_m2 += piece_m2 * f64::from(pieces);
+            demand.elements += u64::from(pieces);
+            if owned {
+                demand.rows += 2 * u64::from(pieces);
+                rays += 2.0 * f64::from(pieces) * missing(piece_m2);
+            }
+        }
+        Self {
+            demand,
+            area_m2,
+            rays,
+        }
+    }
+
+    /// Segments of a direction: each face that a line meets begins one, and so does each line.
+    fn segments(&self, world: &World, line_area_m2: f64, cos: f64) -> f64 {
+        (0.5 * self.area_m2 + cos * world.ground_area_m2()) / line_area_m2
+    }
+
+    fn direction_s(&self, world: &World, line_area_m2: f64, cos: f64) -> f64 {
+        TRIANGLE_S * self.demand.triangles as f64
+            + SEGMENT_S * 0.5 * self.area_m2 / line_area_m2
+            + LINE_S * cos * world.ground_area_m2() / line_area_m2
+    }
+
+    /// Cuts a batch of a block into jobs.
+    fn split(&self, block: usize, batch: &v1::Batch, world: &World, jobs: &mut Vec<JobOf>) {
+        let rows_s = ROW_S * self.demand.rows as f64;
+        let job = |lines: Range<usize>, part, rays, cost_s: f64| JobOf {
+            block,
+            batch: batch.index,
+            lines,
+            part,
+            rays,
+            cost_s: cost_s + rows_s,
+        };
+        let (mut first, mut cost_s) = (0, 0.0);
+        for (k, lines) in batch.lines.iter().enumerate() {
+            let cos = lines.direction.as_ref().map_or(1.0, |d| d.z);
+            let this_s = self.direction_s(world, lines.line_area_m2, cos);
+            let parts = (this_s / JOB_S).round().clamp(1.0, MOST_PARTS) as u32;
+            if cost_s > 0.0 && (cost_s + this_s > JOB_S || parts > 1) {
+                jobs.push(job(first..k, (0, 1), None, cost_s));
+                (first, cost_s) = (k, 0.0);
+            }
+            if parts > 1 {
+                let part = |p| job(k..k + 1, (p, parts), None, this_s / f64::from(parts));
+                jobs.extend((0..parts).map(part));
+                first = k + 1;
+            } else {
+                cost_s += this_s;
+            }
+        }
+        // the rays of a batch come after its lines
+        let rays_s = RAY_S * self.rays;
+        let rest = first..batch.lines.len();
+        if batch.rays.is_none() || cost_s + rays_s <= JOB_S {
+            let rays = batch.rays.map(|_| (0, 1));
+            if rays.is_some() || !rest.is_empty() {
+                jobs.push(job(rest, (0, 1), rays, cost_s + rays_s));
+            }
+            return;
+        }
+        if !rest.is_empty() {
+            jobs.push(job(rest, (0, 1), None, cost_s));
+        }
+        let parts = (rays_s / JOB_S).ceil().clamp(1.0, MOST_PARTS) as u32;
+        let end = batch.lines.len();
+        let part = |p| {
+            job(
+                end..end,
+                (0, 1),
+                Some((p, parts)),
+                rays_s / f64::from(parts),
+            )
+        };
+        jobs.extend((0..parts).map(part));
+    }
+}
