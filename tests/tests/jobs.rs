@@ -83,7 +83,7 @@ fn jobs_of_parts_of_lines_and_of_rays_give_the_bits_of_one_job() {
     for diameter in [Diameter::Infinite, Diameter::Metres(0.3)] {
         let (problem, world, sampling) = setting(&small_maize(), diameter);
         let blocks = [BlockOf::whole(&world)];
-        let whole = trace_here(&problem.scene, &world, &blocks, &sampling, || {}).unwrap();
+        let whole = trace_here(&problem.scene, &world, &blocks, &sampling, || Ok(())).unwrap();
         let mut jobs = Vec::new();
         for batch in batches(&sampling) {
             let job = |lines, part, rays| JobOf {
@@ -126,7 +126,7 @@ fn blocks_with_what_is_near_give_the_bits_of_the_whole_scene() {
     }
     let jobs = split(&world, &blocks, &batches(&sampling), &sampling);
     let cut = by_jobs(&problem, &world, &blocks, &sampling, jobs);
-    let whole = trace_here(&problem.scene, &world, &whole, &sampling, || {}).unwrap();
+    let whole = trace_here(&problem.scene, &world, &whole, &sampling, || Ok(())).unwrap();
     assert!(whole.halves == cut.halves, "rows differ");
 }
 
