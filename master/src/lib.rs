@@ -1,5 +1,5 @@
 //! The master: it plans a solve, computes direct light and far field, solves for the radiosities of
-//! all faces, and writes what came out.
+//! all faces, and writes what came out; here, or as a service for others.
 
 #![allow(
     non_snake_case,
@@ -11,8 +11,10 @@ pub mod exchange;
 pub mod far_field;
 pub mod output;
 pub mod plan;
+pub mod remote;
 pub mod results;
 pub mod run;
+pub mod service;
 pub mod solution;
 pub mod solver;
 pub mod world;

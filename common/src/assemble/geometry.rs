@@ -32,8 +32,11 @@ pub struct Origins {
 }
 
 impl Origins {
-    /// The file and line of a triangle.
+    /// The file and line of a triangle; its number where it did not come from a file.
     pub fn place(&self, triangle: usize) -> Place {
+        if self.files.is_empty() {
+            return Place::file(&format!("triangle {triangle}"));
+        }
         let next = self.files.partition_point(|&(_, first)| first <= triangle);
         let file = next.checked_sub(1).map(|index| self.files[index].0.clone());
         Place {

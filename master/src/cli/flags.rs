@@ -229,3 +229,10 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
         Err(_) => Err(format!("expected a number, found {number}")),
     }
 }
+
+/// A finite number above 0.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|value: &f64| value.is_finite() && *value > 0.0);
+    number.ok_or_else(|| "expected a number above 0".to_owned())
+}

@@ -5,7 +5,10 @@ mod console;
 mod flags;
 mod generate;
 mod record;
+mod remote;
+mod serve;
 mod solve;
+mod status;
 
 use clap::{Parser, Subcommand};
 
@@ -28,6 +31,8 @@ pub(crate) enum Command {
     Solve(solve::SolveArgs),
     Check(check::CheckArgs),
     Generate(generate::GenerateArgs),
+    Serve(serve::ServeArgs),
+    Status(status::StatusArgs),
 }
 
 #[cfg(test)]

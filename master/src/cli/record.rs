@@ -20,7 +20,10 @@ pub(crate) struct Record {
     diameter: Diameter,
     accuracy_percent: f64,
     memory_GiB: f64,
-    threads: usize,
+    /// Absent where the work was done elsewhere.
+    threads: Option<usize>,
+    /// Where the work was done, if not here.
+    master: Option<String>,
     seed: u64,
     estimator: Estimator,
     format: TableFormat,
@@ -34,8 +37,13 @@ struct BandRecord {
 }
 
 impl Record {
-    /// To be called where the work is done: it counts the threads there.
-    pub(crate) fn new(inputs: &Inputs, settings: &Settings, sources: usize) -> Self {
+    /// To be called where the work is done, if not at a master: it counts the threads there.
+    pub(crate) fn new(
+        inputs: &Inputs,
+        settings: &Settings,
+        sources: usize,
+        master: Option<&str>,
+    ) -> Self {
         let options = &inputs.options;
         Self {
             scenes: inputs
@@ -62,7 +70,8 @@ impl Record {
             diameter: settings.diameter,
             accuracy_percent: settings.accuracy_percent,
             memory_GiB: settings.memory_GiB,
-            threads: rayon::current_num_threads(),
+            threads: master.is_none().then(rayon::current_num_threads),
+            master: master.map(str::to_owned),
             seed: settings.seed,
             estimator: settings.estimator,
             format: options.format.unwrap_or_default(),

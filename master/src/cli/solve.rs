@@ -2,26 +2,32 @@
 
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use nestrad_common::assemble::{self, Loaded};
 use nestrad_common::inputs::Inputs;
+use nestrad_common::inspection::Inspection;
 use nestrad_common::light::sky::directions_for;
 use nestrad_common::options::{self, Diameter, Options};
 use nestrad_common::problem::Problem;
+use nestrad_master::exchange::Traced;
 use nestrad_master::output::progress::Progress;
-use nestrad_master::output::resources::Stopwatch;
+use nestrad_master::output::resources::{Stage, Stopwatch, Usage};
 use nestrad_master::output::summary::Summary;
 use nestrad_master::output::{self, Formats, TableFormat, terminal};
 use nestrad_master::plan::{Estimator, Plan, Settings};
-use nestrad_master::run::{self, Finished};
+use nestrad_master::remote::Remote;
+use nestrad_master::run::{self, Counters, Finished};
+use nestrad_master::solution::Solution;
 use rayon::ThreadPoolBuilder;
 
 use super::console::{self, Notes};
-use super::flags::SceneFlags;
+use super::flags::{SceneFlags, positive};
 use super::record::Record;
+use super::remote::MasterFlags;
 
 /// Compute the light that every organ, triangle and soil cell of a canopy gets
 ///
@@ -34,6 +40,9 @@ pub(crate) struct SolveArgs {
 
     #[command(flatten)]
     how: HowFlags,
+
+    #[command(flatten)]
+    place: MasterFlags,
 
     #[command(flatten)]
     results: ResultFlags,
@@ -126,6 +135,7 @@ impl SolveArgs {
             },
             inputs,
             out: self.results.out,
+            place: self.place,
         };
         let threads = task.inputs.options.threads.unwrap_or(0);
         let pool = ThreadPoolBuilder::new().num_threads(threads).build();
@@ -153,7 +163,17 @@ struct Task {
     inputs: Inputs,
     settings: Settings,
     out: PathBuf,
+    place: MasterFlags,
     notes: Notes,
+}
+
+/// What came of it, here or at a master.
+struct Computed {
+    solution: Solution,
+    plan: Box<dyn erased_serde::Serialize>,
+    counters: Counters,
+    stages: Vec<Stage>,
+    usage: Usage,
 }
 
 impl Task {
@@ -164,13 +184,34 @@ impl Task {
         output::check_writable(&self.out)?;
         watch.lap("input");
 
-        let plan = Plan::new(&loaded.problem, &self.settings)?;
+        let problem = Arc::new(loaded.problem);
+        let computed = match &self.place.master {
+            None => self.compute(&problem, &mut watch)?,
+            Some(url) => {
+                let remote = self
+                    .place
+                    .solve(url, problem.clone(), &self.settings, self.notes)?;
+                watch.lap("at the master");
+                elsewhere(remote)?
+            }
+        };
+        self.write(&problem, &loaded.inspection, computed, watch)
+    }
+
+    fn compute(&self, problem: &Problem, watch: &mut Stopwatch) -> Result<Computed> {
+        let plan = Plan::new(problem, &self.settings)?;
         for line in &plan.reasons {
             self.notes.say("plan", line);
         }
         let progress = Progress::new(self.notes.quiet);
-        let finished = run::solve(&loaded.problem, &plan, &progress, &mut watch)?;
-        self.write(&loaded, &plan, &finished, watch)
+        let Finished { solution, counters } = run::solve(problem, &plan, &progress, watch)?;
+        Ok(Computed {
+            solution,
+            plan: Box::new(plan),
+            counters,
+            stages: Vec::new(),
+            usage: Usage::default(),
+        })
     }
 
     /// The problem, with a sky turned into sources.
@@ -188,26 +229,33 @@ impl Task {
 
     fn write(
         &self,
-        loaded: &Loaded,
-        plan: &Plan,
-        finished: &Finished,
+        problem: &Problem,
+        inspection: &Inspection,
+        computed: Computed,
         mut watch: Stopwatch,
     ) -> Result<()> {
-        let Problem { scene, bands, .. } = &loaded.problem;
+        let Problem { scene, bands, .. } = problem;
         let names: Vec<&str> = bands.iter().map(|band| band.name.as_str()).collect();
-        let solution = &finished.solution;
+        let solution = &computed.solution;
         let staged = output::stage(&self.out, scene, &names, solution, self.formats())?;
         watch.lap("output");
-        let usage = watch.usage();
+        let here = watch.usage();
+        let usage = Usage {
+            wall_s: here.wall_s,
+            cpu_s: here.cpu_s + computed.usage.cpu_s,
+            peak_memory_bytes: here.peak_memory_bytes.max(computed.usage.peak_memory_bytes),
+        };
+        let sources = problem.sources.len();
+        let master = self.place.master.as_deref();
         staged.commit(&Summary {
             version: env!("CARGO_PKG_VERSION"),
-            options: &Record::new(&self.inputs, &self.settings, loaded.problem.sources.len()),
-            scene: &loaded.inspection,
-            plan,
+            options: &Record::new(&self.inputs, &self.settings, sources, master),
+            scene: inspection,
+            plan: &computed.plan,
             energy_balance: &solution.balance,
             error_estimates: &output::errors::organ_errors(scene, solution),
-            counters: &finished.counters,
-            stages: watch.stages(),
+            counters: &computed.counters,
+            stages: &[&computed.stages, watch.stages()].concat(),
             resources: usage,
         })?;
         if self.notes.quiet {
@@ -233,8 +281,35 @@ impl Task {
     }
 }
 
-fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok();
-    let number = number.filter(|value: &f64| value.is_finite() && *value > 0.0);
-    number.ok_or_else(|| "expected a number above 0".to_owned())
+/// What a master computed. Its stages come before those of this process.
+fn elsewhere(remote: Remote) -> Result<Computed> {
+    let Remote { solution, summary } = remote;
+    let plan: serde_json::Value =
+        serde_json::from_str(&summary.plan_json).context("the master's plan cannot be read")?;
+    let stages = summary.stages.into_iter().map(|stage| Stage {
+        name: format!("master: {}", stage.name),
+        wall_s: stage.wall_s,
+        cpu_s: stage.cpu_s,
+    });
+    Ok(Computed {
+        solution,
+        plan: Box::new(plan),
+        counters: Counters {
+            elements: summary.elements as usize,
+            direct_lines: summary.direct_lines,
+            exchange: Traced {
+                lines: summary.lines,
+                segments: summary.segments,
+                rays: summary.rays,
+                row_entries: summary.row_entries,
+            },
+            passes: summary.passes,
+        },
+        stages: stages.collect(),
+        usage: Usage {
+            wall_s: summary.wall_s,
+            cpu_s: summary.cpu_s,
+            peak_memory_bytes: Some(summary.peak_memory_bytes).filter(|&bytes| bytes > 0),
+        },
+    })
 }

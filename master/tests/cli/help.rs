@@ -32,6 +32,33 @@ const SOLVE: [&str; 12] = [
     "standard-overcast",
 ];
 
+const SERVE: [&str; 16] = [
+    "--listen <ADDRESS:PORT>",
+    "--tls-cert <FILE>",
+    "--tls-key <FILE>",
+    "--client-ca <FILE>",
+    "--client-token <FILE>",
+    "--worker-token <FILE>",
+    "--allow-plaintext",
+    "--threads <N>",
+    "--solves <N>",
+    "--queue <N>",
+    "--memory <GIB>",
+    "--scene-memory <GIB>",
+    "--result-memory <GIB>",
+    "--drain <SECONDS>",
+    "--metrics <ADDRESS:PORT>",
+    "SIGTERM",
+];
+
+const MASTER: [&str; 5] = [
+    "--master <URL>",
+    "--ca <FILE>",
+    "--cert <FILE>",
+    "--key <FILE>",
+    "--token-file <FILE>",
+];
+
 const PLANTS: [&str; 6] = [
     "--rows <ROWSxPLANTS>",
     "--row-spacing <METRES>",
@@ -55,10 +82,12 @@ const RANDOM: [&str; 8] = [
 #[test]
 fn help_mentions_every_option() {
     let desk = Desk::new();
-    let solve = [&SCENE[..], &SOLVE].concat();
+    let solve = [&SCENE[..], &SOLVE, &MASTER].concat();
     for (command, options) in [
         (&["solve"][..], &solve[..]),
         (&["check"], &SCENE),
+        (&["serve"], &SERVE),
+        (&["status"], &MASTER),
         (&["generate", "maize"], &PLANTS),
         (&["generate", "bean"], &PLANTS),
         (&["generate", "random"], &RANDOM),
@@ -74,7 +103,7 @@ fn help_mentions_every_option() {
 fn the_program_lists_its_commands_and_says_its_version() {
     let desk = Desk::new();
     let help = desk.done(&["--help"]).stdout;
-    for command in ["solve", "check", "generate"] {
+    for command in ["solve", "check", "generate", "serve", "status"] {
         assert!(help.contains(&format!("  {command} ")), "{help}");
     }
     let version = desk.done(&["--version"]).stdout;

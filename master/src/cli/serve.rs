@@ -1,0 +1,126 @@
+//! `nestrad serve`: the master as a service.
+
+use std::net::SocketAddr;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use nestrad_master::service::{Limits, Service, serve_metrics};
+use nestrad_proto::access::Access;
+use tokio::net::TcpListener;
+use tokio::signal::unix::{SignalKind, signal};
+use tracing_subscriber::EnvFilter;
+
+use super::flags::positive;
+
+/// Serve solves to clients over gRPC, until told to stop
+///
+/// Clients are `nestrad solve --master` and programs in any language; see docs/operators.md. On
+/// SIGTERM or Ctrl-C nothing new is taken on, what is being computed is ended and given out, and the
+/// exit code is 0. What happens is said on stderr; NESTRAD_LOG sets how much (debug, info, warn).
+#[derive(Debug, Args)]
+pub(crate) struct ServeArgs {
+    /// Where clients and workers come in; port 0 takes any that is free
+    #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7410")]
+    listen: SocketAddr,
+
+    #[command(flatten)]
+    access: Access,
+
+    #[command(flatten)]
+    limits: LimitFlags,
+
+    /// Where Prometheus reads metrics, over plain HTTP at /metrics [default: nowhere]
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    metrics: Option<SocketAddr>,
+}
+
+#[derive(Args, Clone, Copy, Debug)]
+#[command(next_help_heading = "Limits")]
+struct LimitFlags {
+    /// Threads to compute with, 0 for one per processor
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    threads: u16,
+
+    /// Solves that are computed at a time
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    solves: u8,
+
+    /// Solves that may wait
+    #[arg(long, value_name = "N", default_value_t = 1000)]
+    queue: u32,
+
+    /// Memory that one solve may take, GiB
+    #[arg(long, value_name = "GIB", default_value_t = 8.0, value_parser = positive)]
+    memory: f64,
+
+    /// Memory of the scenes that are held, GiB; the one not used for longest goes first
+    #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
+    scene_memory: f64,
+
+    /// Memory of the results that are held, GiB; the oldest go first
+    #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
+    result_memory: f64,
+
+    /// Time for solves to end when the master is told to stop; then they are cancelled
+    #[arg(long, value_name = "SECONDS", default_value_t = 30)]
+    drain: u32,
+}
+
+impl LimitFlags {
+    fn limits(self) -> Limits {
+        let bytes = |GiB: f64| (GiB * (1u64 << 30) as f64) as u64;
+        Limits {
+            scene_bytes: bytes(self.scene_memory),
+            result_bytes: bytes(self.result_memory),
+            solve_GiB: self.memory,
+            solves: self.solves.into(),
+            queue: self.queue as usize,
+            drain_s: self.drain.into(),
+        }
+    }
+}
+
+impl ServeArgs {
+    pub(crate) fn run(self) -> Result<()> {
+        let filter = EnvFilter::try_from_env("NESTRAD_LOG");
+        tracing_subscriber::fmt()
+            .with_env_filter(filter.unwrap_or_else(|_| EnvFilter::new("info")))
+            .with_writer(std::io::stderr)
+            .with_ansi(false)
+            .init();
+        let runtime = tokio::runtime::Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()
+            .context("cannot start threads")?;
+        runtime.block_on(self.serve())
+    }
+
+    async fn serve(self) -> Result<()> {
+        // before anything listens: a signal that comes early is not lost
+        let mut terminate = signal(SignalKind::terminate()).context("cannot wait for signals")?;
+        let mut interrupt = signal(SignalKind::interrupt()).context("cannot wait for signals")?;
+        let shutdown = async move {
+            tokio::select! {
+                _ = terminate.recv() => {}
+                _ = interrupt.recv() => {}
+            }
+        };
+        let service = Service::new(self.limits.limits(), self.limits.threads.into())?;
+        let listener = bind(self.listen).await?;
+        if let Some(address) = self.metrics {
+            let listener = bind(address).await?;
+            tracing::info!(address = %listener.local_addr()?, "metrics");
+            tokio::spawn(serve_metrics(listener, service.clone()));
+        }
+        tracing::info!(address = %listener.local_addr()?, "serves");
+        service.run(listener, &self.access, shutdown).await?;
+        tracing::info!("stopped");
+        Ok(())
+    }
+}
+
+async fn bind(address: SocketAddr) -> Result<TcpListener> {
+    let listener = TcpListener::bind(address).await;
+    listener.with_context(|| format!("cannot listen on {address}"))
+}

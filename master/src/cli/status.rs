@@ -1,0 +1,182 @@
+//! `nestrad status`: what a master is doing.
+
+use std::fmt::Write as _;
+use std::time::Duration;
+
+use anyhow::{Context, Result, anyhow};
+use clap::Args;
+use nestrad_master::remote;
+use nestrad_proto::channel::{self, Credentials};
+use nestrad_proto::v1;
+use tokio::time::timeout;
+
+use super::console;
+
+/// A master answers within this.
+const ANSWER: Duration = Duration::from_secs(15);
+
+/// Say what a master is doing: its workers, solves, jobs and rates
+#[derive(Debug, Args)]
+pub(crate) struct StatusArgs {
+    /// The master
+    #[arg(long, value_name = "URL")]
+    master: String,
+
+    #[command(flatten)]
+    credentials: Credentials,
+}
+
+impl StatusArgs {
+    pub(crate) fn run(self) -> Result<()> {
+        let runtime = tokio::runtime::Builder::new_current_thread()
+            .enable_all()
+            .build()
+            .context("cannot start threads")?;
+        let status = runtime.block_on(async {
+            let channel = channel::connect(&self.master, &self.credentials)?;
+            let mut master = remote::client(channel);
+            let answer = timeout(ANSWER, master.status(v1::StatusRequest {})).await;
+            let answer = answer.unwrap_or_else(|_| Err(tonic::Status::unavailable("no answer")));
+            answer.map_err(|status| anyhow!("{}: {}", self.master, status.message()))
+        })?;
+        console::print(text(&status.into_inner()).as_bytes())
+    }
+}
+
+fn text(status: &v1::StatusResponse) -> String {
+    let mut text = String::new();
+    let mut line = |what: &str, content: String| {
+        // writing to a string does not fail
+        let _ = writeln!(text, "{what:<10}{content}");
+    };
+    line(
+        "master",
+        format!("version {}, up {}", status.version, time(status.uptime_s)),
+    );
+    let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
+    line(
+        "memory",
+        format!(
+            "{} scenes, {:.1} MiB; results, {:.1} MiB",
+            status.scenes,
+            mebibytes(status.scene_bytes),
+            mebibytes(status.result_bytes)
+        ),
+    );
+    for worker in &status.workers {
+        line(
+            "worker",
+            format!(
+                "{}: {} threads, {} GiB; {} jobs leased, {} done, {} lost; heard of {} ago",
+                printable(&worker.name),
+                worker.threads,
+                worker.memory_gi_b,
+                worker.leased,
+                worker.done,
+                worker.lost,
+                time(worker.silent_s)
+            ),
+        );
+    }
+    line(
+        "jobs",
+        format!(
+            "{} waiting, {} leased, {} done",
+            status.jobs_waiting, status.jobs_leased, status.jobs_done
+        ),
+    );
+    line(
+        "rate",
+        format!(
+            "{:.2} M segments/s, {:.2} M rays/s over the last minute",
+            status.segments_per_s / 1e6,
+            status.rays_per_s / 1e6
+        ),
+    );
+    if let Some(eta_s) = status.eta_s {
+        line("left", time(eta_s));
+    }
+    for solve in &status.solves {
+        line("solve", self::solve(solve));
+    }
+    text
+}
+
+fn solve(solve: &v1::SolveInfo) -> String {
+    let size = format!("{} triangles, {} bands", solve.triangles, solve.bands);
+    let state = match solve.state() {
+        v1::SolveState::Queued => format!("waits since {}", time(solve.age_s)),
+        v1::SolveState::Running if solve.total > 0 => format!(
+            "runs since {}: {}, {} of {}",
+            time(solve.running_s),
+            printable(&solve.stage),
+            solve.done,
+            solve.total
+        ),
+        v1::SolveState::Running => format!(
+            "runs since {}: {}",
+            time(solve.running_s),
+            printable(&solve.stage)
+        ),
+        v1::SolveState::Finished => format!("finished in {}", time(solve.running_s)),
+        v1::SolveState::Failed => "failed".to_owned(),
+        v1::SolveState::Cancelled => "cancelled".to_owned(),
+        v1::SolveState::Unspecified => "is in a state unknown here".to_owned(),
+    };
+    format!("{} ({size}) {state}", printable(&solve.solve_id))
+}
+
+/// What a master or worker calls itself must not steer a terminal.
+fn printable(text: &str) -> String {
+    text.chars().flat_map(char::escape_debug).collect()
+}
+
+fn time(seconds: f64) -> String {
+    if seconds < 60.0 {
+        return format!("{seconds:.1} s");
+    }
+    let minutes = (seconds / 60.0).round() as u64;
+    match (minutes / 60, minutes % 60) {
+        (0, minutes) => format!("{minutes} min"),
+        (hours, minutes) => format!("{hours} h {minutes} min"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn everything_is_said_and_nothing_steers_the_terminal() {
+        let status = v1::StatusResponse {
+            version: "1".into(),
+            uptime_s: 7261.0,
+            workers: vec![v1::WorkerInfo {
+                name: "a\u{1b}[2J".into(),
+                threads: 2,
+                ..v1::WorkerInfo::default()
+            }],
+            eta_s: Some(90.0),
+            solves: vec![v1::SolveInfo {
+                solve_id: "ab".into(),
+                state: v1::SolveState::Running.into(),
+                stage: "exchange".into(),
+                done: 3,
+                total: 16,
+                running_s: 4.0,
+                ..v1::SolveInfo::default()
+            }],
+            ..v1::StatusResponse::default()
+        };
+        let text = text(&status);
+        for part in [
+            "up 2 h 1 min",
+            "2 threads",
+            "exchange, 3 of 16",
+            "left      2 min",
+        ] {
+            assert!(text.contains(part), "{part}: {text}");
+        }
+        assert!(!text.contains('\u{1b}'));
+    }
+}

@@ -1,0 +1,224 @@
+//! The scenes that the master holds: geometries, and what light falls on them. Of bounded size; what
+//! was not used for longest goes first.
+
+use std::collections::HashMap;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nestrad_common::inspection::Inspection;
+use nestrad_common::problem::Problem;
+use nestrad_common::scene::{Material, Scene};
+
+use super::budget::{Budget, Reservation};
+use super::error::{ErrorCode, ServiceError};
+use super::identity::{Id, scene_id};
+use super::intake::Light;
+
+/// Scenes that are held at a time, however small.
+const MAX_SCENES: usize = 1024;
+
+/// What a scene takes besides its numbers, bytes.
+const SCENE_BYTES: u64 = 1024;
+
+/// A checked geometry.
+#[derive(Debug)]
+pub(super) struct HeldGeometry {
+    pub(super) id: Id,
+    pub(super) scene: Scene,
+    pub(super) inspection: Inspection,
+}
+
+/// A geometry and the memory that it is counted with.
+#[derive(Debug)]
+struct Counted<T> {
+    item: T,
+    _memory: Reservation,
+}
+
+/// A scene that can be solved.
+#[derive(Clone, Debug)]
+pub(super) struct HeldScene {
+    pub(super) id: Id,
+    geometry: Arc<Counted<HeldGeometry>>,
+    light: Arc<Counted<Light>>,
+}
+
+impl HeldScene {
+    pub(super) fn geometry(&self) -> &HeldGeometry {
+        &self.geometry.item
+    }
+
+    pub(super) fn light(&self) -> &Light {
+        &self.light.item
+    }
+
+    /// A copy that a solve can work on.
+    pub(super) fn problem(&self) -> Problem {
+        Problem {
+            scene: self.geometry().scene.clone(),
+            bands: self.light().bands.clone(),
+            sources: self.light().sources.clone(),
+        }
+    }
+}
+
+/// All that is held.
+#[derive(Debug)]
+pub(super) struct Scenes {
+    budget: Budget,
+    held: Mutex<Held>,
+}
+
+#[derive(Debug, Default)]
+struct Held {
+    /// Goes up with every use.
+    clock: u64,
+    geometries: HashMap<Id, Used<Arc<Counted<HeldGeometry>>>>,
+    scenes: HashMap<Id, Used<HeldScene>>,
+}
+
+#[derive(Debug)]
+struct Used<T> {
+    item: T,
+    at: u64,
+}
+
+impl Scenes {
+    pub(super) fn new(limit_bytes: u64) -> Self {
+        Self {
+            budget: Budget::new(limit_bytes),
+            held: Mutex::default(),
+        }
+    }
+
+    /// Makes room for something that is about to come. What others still work with cannot be thrown out.
+    pub(super) fn reserve(&self, bytes: u64) -> Result<Reservation, ServiceError> {
+        let mut held = self.lock();
+        loop {
+            if let Some(reservation) = self.budget.take(bytes) {
+                return Ok(reservation);
+            }
+            // what could never fit must not drive out the others
+            if bytes > self.budget.limit() || !held.evict() {
+                let (limit, used) = (self.budget.limit(), self.budget.used());
+                let message = format!(
+                    "the scene takes {bytes} bytes: the master holds {limit} bytes of scenes at most, \
+                     of which {used} are in use"
+                );
+                return Err(ServiceError::new(ErrorCode::Exhausted, message));
+            }
+        }
+    }
+
+    /// Keeps a geometry; the one that is there already if it is the same.
+    pub(super) fn keep_geometry(&self, geometry: HeldGeometry, memory: Reservation) {
+        let mut held = self.lock();
+        let at = held.tick();
+        held.geometries
+            .entry(geometry.id)
+            .and_modify(|known| known.at = at)
+            .or_insert_with(|| Used {
+                item: Arc::new(Counted {
+                    item: geometry,
+                    _memory: memory,
+                }),
+                at,
+            });
+    }
+
+    /// What a geometry that is held is made of.
+    pub(super) fn materials(&self, id: Id) -> Result<Vec<Material>, ServiceError> {
+        let geometry = self.lock().geometry(id)?;
+        Ok(geometry.item.scene.materials.clone())
+    }
+
+    /// Keeps a scene of a geometry that is held.
+    pub(super) fn keep_scene(&self, geometry: Id, light: Light) -> Result<HeldScene, ServiceError> {
+        let memory = self.reserve(SCENE_BYTES + light.bytes())?;
+        let mut held = self.lock();
+        let scene = HeldScene {
+            id: scene_id(geometry, &light.bands, &light.sources),
+            geometry: held.geometry(geometry)?,
+            light: Arc::new(Counted {
+                item: light,
+                _memory: memory,
+            }),
+        };
+        while held.scenes.len() >= MAX_SCENES && !held.scenes.contains_key(&scene.id) {
+            held.evict_scene();
+        }
+        let at = held.tick();
+        let known = held
+            .scenes
+            .entry(scene.id)
+            .or_insert(Used { item: scene, at });
+        known.at = at;
+        Ok(known.item.clone())
+    }
+
+    /// A scene that was uploaded.
+    pub(super) fn scene(&self, id: Id) -> Result<HeldScene, ServiceError> {
+        let mut held = self.lock();
+        let at = held.tick();
+        let Some(known) = held.scenes.get_mut(&id) else {
+            return Err(not_held("scene", id));
+        };
+        known.at = at;
+        let scene = known.item.clone();
+        held.geometry(scene.geometry().id)?;
+        Ok(scene)
+    }
+
+    /// How many scenes there are.
+    pub(super) fn count(&self) -> usize {
+        self.lock().scenes.len()
+    }
+
+    /// Bytes that are taken, in use or not.
+    pub(super) fn bytes(&self) -> u64 {
+        self.budget.used()
+    }
+
+    fn lock(&self) -> std::sync::MutexGuard<'_, Held> {
+        // the maps are whole at any time, even if a thread died with the lock
+        self.held.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Held {
+    fn tick(&mut self) -> u64 {
+        self.clock += 1;
+        self.clock
+    }
+
+    fn geometry(&mut self, id: Id) -> Result<Arc<Counted<HeldGeometry>>, ServiceError> {
+        let at = self.tick();
+        let Some(known) = self.geometries.get_mut(&id) else {
+            return Err(not_held("geometry", id));
+        };
+        known.at = at;
+        Ok(known.item.clone())
+    }
+
+    /// Throws out the geometry that was not used for longest, with its scenes, or else a scene. False
+    /// if there is nothing left.
+    fn evict(&mut self) -> bool {
+        let oldest = self.geometries.iter().min_by_key(|(_, used)| used.at);
+        let Some((&id, _)) = oldest else {
+            return self.evict_scene();
+        };
+        self.geometries.remove(&id);
+        self.scenes.retain(|_, used| used.item.geometry().id != id);
+        true
+    }
+
+    fn evict_scene(&mut self) -> bool {
+        let oldest = self.scenes.iter().min_by_key(|(_, used)| used.at);
+        let oldest = oldest.map(|(&id, _)| id);
+        oldest.is_some_and(|id| self.scenes.remove(&id).is_some())
+    }
+}
+
+fn not_held(what: &str, id: Id) -> ServiceError {
+    let message = format!("{what} {id} is not held (any more): upload it again");
+    ServiceError::new(ErrorCode::NotFound, message)
+}
