@@ -28,7 +28,7 @@ pub(crate) struct Cli {
 
 #[derive(Debug, Subcommand)]
 pub(crate) enum Command {
-    Solve(solve::SolveArgs),
+    Solve(Box<solve::SolveArgs>),
     Check(check::CheckArgs),
     Generate(generate::GenerateArgs),
     Serve(serve::ServeArgs),
