@@ -5,6 +5,7 @@
 //! periodic canopy costs nothing extra and is exact at any inclination. The lattice is fixed to the
 //! world: whichever part of a scene is drawn, the same line meets the same triangles.
 
+mod reach;
 mod scan;
 mod soup;
 mod strips;
