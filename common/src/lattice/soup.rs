@@ -29,24 +29,26 @@ impl Soup {
         &self.triangles
     }
 
-    /// The triangles that a line may meet, by rising number. Those left out meet none.
-    pub(super) fn reached(&self, lattice: &Lattice) -> Vec<u32> {
-        let mut reached = Vec::with_capacity(self.triangles.len() / 2);
+    /// Calls `reached` for each triangle that a line may meet, by rising number. Those left out meet none.
+    ///
+    /// Vertices are handed on from the columns that the test has just read: most triangles are left out,
+    /// so reading the others from elsewhere would cost a cache miss each.
+    #[inline]
+    pub(super) fn for_each_reached(
+        &self,
+        lattice: &Lattice,
+        mut reached: impl FnMut(u32, &[DVec3; 3]),
+    ) {
         let mut hit = [false; BLOCK];
         for start in (0..self.triangles.len()).step_by(BLOCK) {
             let end = (start + BLOCK).min(self.triangles.len());
-            let vertex = |v: usize| [0, 1, 2].map(|axis| &self.columns[v][axis][start..end]);
-            reach::test(
-                lattice,
-                [vertex(0), vertex(1), vertex(2)],
-                &mut hit[..end - start],
-            );
-            for (k, &hit) in hit[..end - start].iter().enumerate() {
-                if hit {
-                    reached.push((start + k) as u32);
-                }
+            let columns =
+                [0, 1, 2].map(|v| [0, 1, 2].map(|axis| &self.columns[v][axis][start..end]));
+            reach::test(lattice, columns, &mut hit[..end - start]);
+            for k in (0..end - start).filter(|&k| hit[k]) {
+                let vertex = |v: [&[f64]; 3]| DVec3::new(v[0][k], v[1][k], v[2][k]);
+                reached((start + k) as u32, &columns.map(vertex));
             }
         }
-        reached
     }
 }

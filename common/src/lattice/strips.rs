@@ -7,66 +7,77 @@ use glam::DVec3;
 use super::{Lattice, Projected, Soup};
 
 /// Which triangles to draw in which strip.
-pub struct Strips {
+pub struct Strips<'a> {
+    lattice: &'a Lattice,
+    soup: &'a Soup,
     rows_in_strip: u32,
-    rows: u32,
-    /// Start of each strip's list in `triangles`, and its length at the end.
+    /// Start of each strip's list in `triangles`, and its length at the end; one strip needs no lists.
     start: Vec<usize>,
     triangles: Vec<u32>,
 }
 
-impl Strips {
+impl<'a> Strips<'a> {
     /// Sorts triangles into strips of about `lines_in_strip` lines (at least one row of them).
-    pub fn new(lattice: &Lattice, soup: &Soup, lines_in_strip: usize) -> Self {
+    pub fn new(lattice: &'a Lattice, soup: &'a Soup, lines_in_strip: usize) -> Self {
         let rows_in_strip = (lines_in_strip / lattice.nx.max(1) as usize)
             .clamp(1, lattice.ny.max(1) as usize) as u32;
         let mut strips = Self {
+            lattice,
+            soup,
             rows_in_strip,
-            rows: lattice.ny,
             start: Vec::new(),
             triangles: Vec::new(),
         };
-        let reached = soup.reached(lattice);
         if strips.len() > 1 {
-            strips.sort(lattice, soup.triangles(), &reached);
-        } else {
-            strips.start = vec![0, reached.len()];
-            strips.triangles = reached;
+            strips.sort();
         }
         strips
     }
 
+    /// Calls `draw` for each triangle that reaches into a strip, once, by rising number.
+    #[inline]
+    pub fn for_each(&self, strip: u32, mut draw: impl FnMut(u32, &Projected)) {
+        let mut project = |t: u32, triangle: &[DVec3; 3]| {
+            if let Some(projected) = Projected::new(self.lattice, triangle) {
+                draw(t, &projected);
+            }
+        };
+        if self.start.is_empty() {
+            self.soup.for_each_reached(self.lattice, project);
+        } else {
+            let list = self.start[strip as usize]..self.start[strip as usize + 1];
+            for &t in &self.triangles[list] {
+                project(t, &self.soup.triangles()[t as usize]);
+            }
+        }
+    }
+
     /// Number of strips.
     pub fn len(&self) -> u32 {
-        self.rows.div_ceil(self.rows_in_strip)
+        self.lattice.ny.div_ceil(self.rows_in_strip)
     }
 
     /// A lattice without rows.
     pub fn is_empty(&self) -> bool {
-        self.rows == 0
+        self.lattice.ny == 0
     }
 
     /// The lattice rows of a strip.
     pub fn rows(&self, strip: u32) -> Range<u32> {
-        strip * self.rows_in_strip..((strip + 1) * self.rows_in_strip).min(self.rows)
+        strip * self.rows_in_strip..((strip + 1) * self.rows_in_strip).min(self.lattice.ny)
     }
 
-    /// The triangles that reach into a strip, each once, by rising number.
-    pub fn triangles(&self, strip: u32) -> &[u32] {
-        &self.triangles[self.start[strip as usize]..self.start[strip as usize + 1]]
-    }
-
-    fn sort(&mut self, lattice: &Lattice, triangles: &[[DVec3; 3]], reached: &[u32]) {
-        let mut members: Vec<(u32, u32)> = Vec::with_capacity(reached.len() * 2);
-        for &t in reached {
-            if let Some(projected) = Projected::new(lattice, &triangles[t as usize]) {
-                for rows in self.wrapped(lattice, &projected).into_iter().flatten() {
+    fn sort(&mut self) {
+        let mut members: Vec<(u32, u32)> = Vec::new();
+        self.soup.for_each_reached(self.lattice, |t, triangle| {
+            if let Some(projected) = Projected::new(self.lattice, triangle) {
+                for rows in self.wrapped(&projected).into_iter().flatten() {
                     let strips =
                         rows.start / self.rows_in_strip..=(rows.end - 1) / self.rows_in_strip;
                     members.extend(strips.map(|s| (s, t)));
                 }
             }
-        }
+        });
         let mut next = vec![0usize; self.len() as usize + 1];
         for &(s, _) in &members {
             next[s as usize + 1] += 1;
@@ -83,10 +94,10 @@ impl Strips {
     }
 
     /// Lattice rows that a triangle reaches: up to two ranges that share no strip.
-    fn wrapped(&self, lattice: &Lattice, projected: &Projected) -> [Option<Range<u32>>; 2] {
-        let (rows, ny) = (projected.rows(), i64::from(lattice.ny));
+    fn wrapped(&self, projected: &Projected) -> [Option<Range<u32>>; 2] {
+        let (rows, ny) = (projected.rows(), i64::from(self.lattice.ny));
         let range = |from: i64, to: i64| (from < to).then_some(from as u32..to as u32);
-        if !lattice.periodic {
+        if !self.lattice.periodic {
             return [range(rows.start.max(0), rows.end.min(ny)), None];
         }
         if rows.end - rows.start >= ny {
@@ -105,19 +116,18 @@ impl Strips {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Extent, Lattice, Projected, Soup};
+    use super::super::{Extent, Lattice, Soup};
     use super::*;
     use proptest::prelude::*;
 
     fn hits(lattice: &Lattice, triangles: &[[DVec3; 3]], lines_in_strip: usize) -> Vec<u32> {
-        let strips = Strips::new(lattice, &Soup::new(triangles.to_vec()), lines_in_strip);
+        let soup = Soup::new(triangles.to_vec());
+        let strips = Strips::new(lattice, &soup, lines_in_strip);
         let mut hits = vec![0; lattice.lines()];
         for s in 0..strips.len() {
-            for &t in strips.triangles(s) {
-                if let Some(p) = Projected::new(lattice, &triangles[t as usize]) {
-                    p.scan(lattice, strips.rows(s), false, |f| hits[f.line] += 1);
-                }
-            }
+            strips.for_each(s, |_, p| {
+                p.scan(lattice, strips.rows(s), false, |f| hits[f.line] += 1);
+            });
         }
         hits
     }

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use nestrad_common::elements::{self, Elements};
-use nestrad_common::lattice::{Lattice, Projected, Soup, Strips};
+use nestrad_common::lattice::{Lattice, Soup, Strips};
 
 /// The element on top, and the face that it shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -44,12 +44,8 @@ impl Buffer {
             let first_line = rows.start as usize * nx;
             self.key.clear();
             self.key.resize(rows.len() * nx, floor);
-            for &t in strips.triangles(s) {
-                let t = t as usize;
-                let Some(projected) = Projected::new(lattice, &soup.triangles()[t]) else {
-                    continue;
-                };
-                let (first, n) = (elements.first[t], elements.divisions[t]);
+            strips.for_each(s, |t, projected| {
+                let (first, n) = (elements.first[t as usize], elements.divisions[t as usize]);
                 projected.scan(lattice, rows.clone(), n > 1, |f| {
                     let element = if n > 1 {
                         first + elements::piece(n, f.place[0], f.place[1])
@@ -64,7 +60,7 @@ impl Buffer {
                     let top = &mut self.key[f.line - first_line];
                     *top = (*top).max(key);
                 });
-            }
+            });
             strip(self, rows);
         }
     }

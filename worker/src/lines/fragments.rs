@@ -4,7 +4,7 @@
 //! the cache. Within a strip fragments are sorted by line with a counting sort, then by depth.
 
 use nestrad_common::elements;
-use nestrad_common::lattice::{Lattice, Projected, Strips};
+use nestrad_common::lattice::{Lattice, Strips};
 
 use crate::block::Block;
 use crate::part::Part;
@@ -55,7 +55,7 @@ pub(crate) fn for_each_line(
     for s in part.of(strips.len() as usize) {
         let rows = strips.rows(s as u32);
         lines += u64::from(rows.end - rows.start) * u64::from(lattice.nx);
-        strip.draw(block, lattice, rows, strips.triangles(s as u32));
+        strip.draw(block, lattice, &strips, s as u32);
         strip.sort();
         strip.for_each_line(&mut line);
     }
@@ -74,24 +74,14 @@ struct Strip {
 }
 
 impl Strip {
-    fn draw(
-        &mut self,
-        block: &Block,
-        lattice: &Lattice,
-        rows: std::ops::Range<u32>,
-        triangles: &[u32],
-    ) {
-        let nx = lattice.nx as usize;
+    fn draw(&mut self, block: &Block, lattice: &Lattice, strips: &Strips, strip: u32) {
+        let (rows, nx) = (strips.rows(strip), lattice.nx as usize);
         self.first_line = rows.start as usize * nx;
         self.drawn.clear();
         self.end.clear();
         self.end.resize((rows.end - rows.start) as usize * nx, 0);
-        for &t in triangles {
-            let t = t as usize;
-            let Some(projected) = Projected::new(lattice, &block.soup.triangles()[t]) else {
-                continue;
-            };
-            let (first, n) = (block.first[t], block.divisions[t]);
+        strips.for_each(strip, |t, projected| {
+            let (first, n) = (block.first[t as usize], block.divisions[t as usize]);
             projected.scan(lattice, rows.clone(), n > 1, |f| {
                 let element = if n > 1 {
                     first + elements::piece(n, f.place[0], f.place[1])
@@ -105,7 +95,7 @@ impl Strip {
                     Hit::new(f.depth, element, projected.upper_along),
                 ));
             });
-        }
+        });
     }
 
     fn sort(&mut self) {
