@@ -42,15 +42,15 @@ impl Projected {
     #[inline]
     pub fn new(lattice: &Lattice, triangle: &[DVec3; 3]) -> Option<Self> {
         let v = triangle.map(|p| lattice.v(p.y, p.z));
-        let (first_row, end_row) = (
-            above(v[0].min(v[1]).min(v[2])),
-            above(v[0].max(v[1]).max(v[2])),
-        );
+        let Range {
+            start: first_row,
+            end: end_row,
+        } = whole_numbers(v);
         if first_row >= end_row {
             return None;
         }
         let u = triangle.map(|p| lattice.u(p.x, p.z));
-        if above(u[0].min(u[1]).min(u[2])) >= above(u[0].max(u[1]).max(u[2])) {
+        if whole_numbers(u).is_empty() {
             return None;
         }
         let mut vertex = [0usize, 1, 2];
@@ -72,11 +72,6 @@ impl Projected {
             first_row,
             end_row,
         })
-    }
-
-    /// Unwrapped lattice rows that the triangle reaches.
-    pub fn rows(&self) -> Range<i64> {
-        self.first_row..self.end_row
     }
 
     /// Calls `hit` for every line that meets the triangle and whose lattice row is in `rows`
@@ -136,6 +131,16 @@ impl Projected {
             }
         }
     }
+}
+
+/// Unwrapped lattice rows that a triangle reaches.
+pub(super) fn rows(lattice: &Lattice, triangle: &[DVec3; 3]) -> Range<i64> {
+    whole_numbers(triangle.map(|p| lattice.v(p.y, p.z)))
+}
+
+#[inline]
+fn whole_numbers([a, b, c]: [f64; 3]) -> Range<i64> {
+    above(a.min(b).min(c))..above(a.max(b).max(c))
 }
 
 /// The row or column of the lattice that an unwrapped one is; `None` past the rim of an open lattice.

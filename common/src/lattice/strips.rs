@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use glam::DVec3;
 
-use super::{Lattice, Projected, Soup};
+use super::{Lattice, Projected, Soup, scan};
 
 /// Which triangles to draw in which strip.
 pub struct Strips<'a> {
@@ -70,12 +70,10 @@ impl<'a> Strips<'a> {
     fn sort(&mut self) {
         let mut members: Vec<(u32, u32)> = Vec::new();
         self.soup.for_each_reached(self.lattice, |t, triangle| {
-            if let Some(projected) = Projected::new(self.lattice, triangle) {
-                for rows in self.wrapped(&projected).into_iter().flatten() {
-                    let strips =
-                        rows.start / self.rows_in_strip..=(rows.end - 1) / self.rows_in_strip;
-                    members.extend(strips.map(|s| (s, t)));
-                }
+            let reached = scan::rows(self.lattice, triangle);
+            for rows in self.wrapped(&reached).into_iter().flatten() {
+                let strips = rows.start / self.rows_in_strip..=(rows.end - 1) / self.rows_in_strip;
+                members.extend(strips.map(|s| (s, t)));
             }
         });
         let mut next = vec![0usize; self.len() as usize + 1];
@@ -94,8 +92,8 @@ impl<'a> Strips<'a> {
     }
 
     /// Lattice rows that a triangle reaches: up to two ranges that share no strip.
-    fn wrapped(&self, projected: &Projected) -> [Option<Range<u32>>; 2] {
-        let (rows, ny) = (projected.rows(), i64::from(self.lattice.ny));
+    fn wrapped(&self, rows: &Range<i64>) -> [Option<Range<u32>>; 2] {
+        let ny = i64::from(self.lattice.ny);
         let range = |from: i64, to: i64| (from < to).then_some(from as u32..to as u32);
         if !self.lattice.periodic {
             return [range(rows.start.max(0), rows.end.min(ny)), None];
