@@ -11,13 +11,14 @@
 //! excess of lines between i and j is not squared: that removes the bias that one set of lines, used
 //! both ways, has in multiple scattering, and every line still serves both its ends. All x depend on y
 //! alone and all y on x alone, so a pass is a parallel Gauss-Seidel sweep (a red-black one) with one
-//! result for any number of threads. The pair is 2-cyclic and consistently ordered, so Young's theory
-//! of over-relaxation applies where its eigenvalues are real (Young 1971; Hageman & Young 1981, chapter
-//! 9); see `relaxation` for where they are not.
+//! result for any number of threads. Passes are accelerated by a minimal-residual method (`krylov`), so
+//! that a canopy that absorbs next to nothing converges, too.
 
-mod relaxation;
+mod gather;
+mod krylov;
+mod lane;
+mod pass;
 mod spread;
-mod sweep;
 
 use nestrad_common::problem::Problem;
 use thiserror::Error;
@@ -25,12 +26,12 @@ use thiserror::Error;
 use crate::exchange::{Exchange, Outlook};
 use crate::far_field::closure::FarRows;
 use crate::world::World;
+use gather::Gather;
+use krylov::{Descent, difference};
+use lane::PULLED_TOGETHER;
+use pass::Pass;
 use spread::Spread;
 pub use spread::Variances;
-use sweep::Gather;
-
-/// Values per band of a group of `N` bands.
-type Lane<const N: usize> = [f64; N];
 
 /// Batches in a half of the exchange.
 pub const HALF_BATCHES: usize = 8;
@@ -155,87 +156,106 @@ struct Group<'a> {
 
 impl Group<'_> {
     fn solve<const N: usize>(&self, first: usize, all: &mut Irradiance) -> Result<(), SolveError> {
-        let System {
-            problem,
-            world,
-            outlook,
-            far,
-            ..
-        } = self.system;
-        let total = problem.bands.len();
-        let lanes = |values: &[f64]| -> Vec<[f64; N]> {
-            values
-                .chunks_exact(total)
-                .map(|v| std::array::from_fn(|k| self.bands.get(k).map_or(0.0, |&b| v[b])))
-                .collect()
-        };
-        let gather = Gather::<N>::new(problem, world, outlook, far, self.bands);
-        // an element that is partly buried has its light on the rest of it
-        let mut direct = lanes(self.system.direct_W_m2);
-        for (lane, &exposed) in direct.iter_mut().zip(&outlook.exposed) {
-            *lane = lane.map(|e| if exposed > 0.0 { e / exposed } else { 0.0 });
-        }
-        let fixed = lanes(self.system.fixed_W_m2);
-        let halves = &self.system.exchange.halves;
-        let mut x = gather.start(direct.clone(), &fixed);
-        let mut y = gather.start(direct.clone(), &fixed);
-
-        let mut relaxation = [relaxation::Relaxation::new(); N];
-        let mut left = vec![f64::INFINITY; self.bands.len()];
-        let mut passes = 0;
-        while passes < self.tolerance.most_passes {
-            let omega = relaxation.map(|r| r.omega);
-            let from_a = gather.sweep(0, &halves[0], &y, &direct, &omega, &mut x);
-            let from_b = gather.sweep(1, &halves[1], &x, &direct, &omega, &mut y);
-            passes += 1;
-            for (k, left) in left.iter_mut().enumerate() {
-                let incoming = self.system.incoming_W[self.bands[k]].max(f64::MIN_POSITIVE);
-                *left = relaxation[k].after(0.5 * (from_a[k] + from_b[k]) / incoming);
-            }
-            if left.iter().all(|&l| l <= self.tolerance.absorbed) {
-                break;
-            }
-        }
-        for (k, &l) in left.iter().enumerate() {
+        let problem = self.system.problem;
+        let gather = Gather::<N>::new(&self.system, self.bands);
+        let mut pass = Pass::new(&self.system, &gather, self.bands);
+        let left = self.converge(&mut pass);
+        for (k, &l) in left[..self.bands.len()].iter().enumerate() {
             if l > self.tolerance.absorbed || l.is_nan() {
                 return Err(SolveError::NotConverged {
                     band: problem.bands[self.bands[k]].name.clone(),
-                    passes,
+                    passes: pass.done,
                     left: l,
                     wanted: self.tolerance.absorbed,
                 });
             }
             all.left[first + k] = l;
         }
-        all.passes = all.passes.max(passes);
-        for (half, from) in all.halves.iter_mut().zip([&x, &y]) {
+        all.passes = all.passes.max(pass.done);
+        self.take(&pass, first, all);
+        for pair in (0..self.bands.len()).step_by(PULLED_TOGETHER) {
+            let bands = &self.bands[pair..(pair + PULLED_TOGETHER).min(self.bands.len())];
+            let variances = &mut all.variances[first + pair..first + pair + bands.len()];
+            let spread = Spread {
+                system: self.system,
+                bands,
+            };
+            for (half, seen) in [&pass.y, &pass.x].into_iter().enumerate() {
+                let of = |lane: &[f64; N]| {
+                    std::array::from_fn(|k| lane.get(pair + k).copied().unwrap_or(0.0))
+                };
+                let seen: Vec<_> = seen.radiosity.iter().map(of).collect();
+                spread.add(half, &seen, variances);
+            }
+        }
+        Ok(())
+    }
+
+    /// Passes until what is left to change in the absorbed power is below the tolerance, or there have been
+    /// too many; returns what is left, relative to what comes in, and leaves the solution in `pass`.
+    fn converge<const N: usize>(&self, pass: &mut Pass<N>) -> [f64; N] {
+        let System { world, outlook, .. } = self.system;
+        let gather = pass.gather;
+        let weight: Vec<f64> = (0..world.rows())
+            .map(|row| world.row_area_m2(row as u32) * outlook.exposed[row])
+            .collect();
+        let size = |field: &[[f64; N]]| -> [f64; N] {
+            let absorbed = gather.absorbed(field);
+            std::array::from_fn(|k| match self.bands.get(k) {
+                Some(&b) => absorbed[k] / self.system.incoming_W[b].max(f64::MIN_POSITIVE),
+                None => 0.0,
+            })
+        };
+        let reached = |left: &[f64; N], wanted: f64| left.iter().all(|&l| l <= wanted);
+        let mut y = pass.first();
+        // what is left to go for each unit of change in a plain pass
+        let mut behind = [f64::INFINITY; N];
+        loop {
+            pass.with_light(&y);
+            let residual = difference(&pass.y.irradiance, &y);
+            let left = times(size(&residual), behind);
+            if reached(&left, self.tolerance.absorbed) || pass.done >= self.tolerance.most_passes {
+                return left;
+            }
+            let mut descent = Descent::new(&weight, residual);
+            // a pass more checks what the steps have come to
+            while pass.done + 1 < self.tolerance.most_passes {
+                descent.step(&mut y, |p| pass.scattering(p), size);
+                let (left, change) = (descent.left(), size(descent.residual()));
+                behind = std::array::from_fn(|k| match change[k] {
+                    0.0 => 1.0,
+                    c => (left[k] / c).max(1.0),
+                });
+                if reached(&left, 0.5 * self.tolerance.absorbed) {
+                    break;
+                }
+            }
+        }
+    }
+
+    /// Takes the solution over.
+    fn take<const N: usize>(&self, pass: &Pass<N>, first: usize, all: &mut Irradiance) {
+        for (half, from) in all.halves.iter_mut().zip([&pass.x, &pass.y]) {
             for (row, lane) in from.irradiance.iter().enumerate() {
                 for k in 0..self.bands.len() {
                     half[row * all.bands + first + k] = lane[k];
                 }
             }
         }
-        let far_start = world.ends.far_start() as usize;
-        for (row, (p, q)) in x.radiosity[far_start..]
+        let far_start = self.system.world.ends.far_start() as usize;
+        for (row, (p, q)) in pass.x.radiosity[far_start..]
             .iter()
-            .zip(&y.radiosity[far_start..])
+            .zip(&pass.y.radiosity[far_start..])
             .enumerate()
         {
             for k in 0..self.bands.len() {
                 all.far_W_m2[row * all.bands + first + k] = 0.5 * (p[k] + q[k]);
             }
         }
-        for (k, &band) in self.bands.iter().enumerate() {
-            let spread = Spread {
-                system: self.system,
-                band,
-                halves,
-            };
-            for (half, seen) in [&y, &x].into_iter().enumerate() {
-                let seen: Vec<f64> = seen.radiosity.iter().map(|lane| lane[k]).collect();
-                spread.add(half, &seen, &mut all.variances[first + k]);
-            }
-        }
-        Ok(())
     }
+}
+
+/// Products; nothing is nothing, however often.
+fn times<const N: usize>(a: [f64; N], b: [f64; N]) -> [f64; N] {
+    std::array::from_fn(|k| if a[k] == 0.0 { 0.0 } else { a[k] * b[k] })
 }

@@ -10,13 +10,14 @@
 
 use rayon::prelude::*;
 
-use super::sweep::Gather;
-use super::{HALF_BATCHES, Lane, System};
-use crate::exchange::HalfRows;
+use super::gather::Gather;
+use super::lane::{Lane, PULLED_TOGETHER, PULLS, Pull};
+use super::{HALF_BATCHES, System};
 use crate::far_field::closure::flux_weight;
 use crate::world;
 
-type Pull = Lane<HALF_BATCHES>;
+/// A number for each batch.
+type PerBatch = [f64; HALF_BATCHES];
 
 /// Variances of one band.
 #[derive(Clone, Debug, Default)]
@@ -32,13 +33,11 @@ pub struct Variances {
     pub balance_W2: [f64; 5],
 }
 
-/// A band's batches in one half, around the solution.
+/// The batches of the exchange, around the solution in a few bands.
 pub(super) struct Spread<'a> {
     pub(super) system: System<'a>,
-    /// Number of the band.
-    pub(super) band: usize,
-    /// The halves of the exchange.
-    pub(super) halves: &'a [HalfRows; 2],
+    /// Numbers of the bands.
+    pub(super) bands: &'a [usize],
 }
 
 /// What a pull does to irradiances and to the radiosities of the far ends.
@@ -53,84 +52,78 @@ const FOLLOWED: f64 = 0.03;
 /// Half passes that a pull is followed for at most.
 const MOST_STEPS: usize = 12;
 
+/// A number for each band.
+type PerBand = [f64; PULLED_TOGETHER];
+
 impl Spread<'_> {
-    /// Adds the variances that the batches of a half leave to `sum`. `seen`: radiosity, in this band,
-    /// of what that half looks at.
-    pub(super) fn add(&self, half: usize, seen: &[f64], sum: &mut Variances) {
-        let pulls = self.pulls(half, seen);
-        let change = self.followed(half, pulls);
-        self.collect(&change, sum);
+    /// Adds the variances that the batches of a half leave to `sums`, one per band. `seen`: radiosity, in
+    /// these bands, of what that half looks at.
+    pub(super) fn add(&self, half: usize, seen: &[PerBand], sums: &mut [Variances]) {
+        let unit = units(seen);
+        let change = self.followed(half, self.pulls(half, seen, unit));
+        for (k, sum) in sums.iter_mut().enumerate() {
+            self.collect(&change, (k, unit[k]), sum);
+        }
     }
 
-    /// How each batch of a half pulls the irradiance of each row.
-    fn pulls(&self, half: usize, seen: &[f64]) -> Vec<Pull> {
+    /// How each batch of a half pulls the irradiance of each row, in units of `unit`.
+    fn pulls(&self, half: usize, seen: &[PerBand], unit: PerBand) -> Vec<Pull> {
         let buried = self.system.world.ends.buried();
-        let rows = &self.halves[half];
+        let rows = &self.system.exchange.halves[half];
         let weights = &self.system.outlook.weight[half];
         (0..self.system.world.rows())
             .into_par_iter()
             .with_min_len(1024)
             .map(|row| {
-                let (mut sums, mut counts) = ([0.0; HALF_BATCHES], [0usize; HALF_BATCHES]);
+                let mut sums = [[0.0; HALF_BATCHES]; PULLED_TOGETHER];
+                let mut counts = [0usize; HALF_BATCHES];
                 for (g, entries) in rows.by_batch(row).enumerate() {
                     for &end in entries {
-                        sums[g] += seen[end as usize];
+                        for (sums, seen) in sums.iter_mut().zip(&seen[end as usize]) {
+                            sums[g] += seen;
+                        }
                         counts[g] += usize::from(end != buried);
                     }
                 }
-                let mean = sums.iter().sum::<f64>() * weights[row];
-                std::array::from_fn(|g| (sums[g] - mean * counts[g] as f64) * weights[row])
+                let mean = sums.map(|s| s.iter().sum::<f64>() * weights[row]);
+                Pull::of(std::array::from_fn(|n| {
+                    let (k, g) = (n / HALF_BATCHES, n % HALF_BATCHES);
+                    (sums[k][g] - mean[k] * counts[g] as f64) * weights[row] / unit[k]
+                }))
             })
             .collect()
     }
 
     /// The change of the result, the mean of both halves, that pulls on one half bring about.
     fn followed(&self, half: usize, pulls: Vec<Pull>) -> Change {
-        let System {
-            problem,
-            world,
-            outlook,
-            far,
-            ..
-        } = self.system;
-        let gather =
-            Gather::<HALF_BATCHES>::new(problem, world, outlook, far, &[self.band; HALF_BATCHES]);
-        let dark =
-            vec![[0.0; HALF_BATCHES]; self.system.world.ends.len() - self.system.world.rows()];
-        let none = vec![[0.0; HALF_BATCHES]; self.system.world.rows()];
+        let world = self.system.world;
+        let lanes: Vec<usize> = self
+            .bands
+            .iter()
+            .flat_map(|&band| [band; HALF_BATCHES])
+            .collect();
+        let gather = Gather::<PULLS>::new(&self.system, &lanes);
+        let halves = &self.system.exchange.halves;
+        let dark = vec![Pull::NONE; world.ends.len() - world.rows()];
         let first = gather.absorbed(&pulls);
         let mut pulled = gather.start(pulls.clone(), &dark);
-        let mut other = gather.start(none.clone(), &dark);
+        let mut other = gather.start(vec![Pull::NONE; world.rows()], &dark);
         for step in 0..MOST_STEPS {
-            let omega = [1.0; HALF_BATCHES];
             let change = if step % 2 == 0 {
-                gather.sweep(
-                    1 - half,
-                    &self.halves[1 - half],
-                    &pulled,
-                    &none,
-                    &omega,
-                    &mut other,
-                )
+                gather.sweep(1 - half, &halves[1 - half], &pulled, None, &mut other)
             } else {
-                gather.sweep(
-                    half,
-                    &self.halves[half],
-                    &other,
-                    &pulls,
-                    &omega,
-                    &mut pulled,
-                )
+                gather.sweep(half, &halves[half], &other, Some(&pulls), &mut pulled)
             };
-            if (0..HALF_BATCHES).all(|g| change[g] <= FOLLOWED * first[g]) {
+            if (0..PULLS).all(|g| change[g] <= FOLLOWED * first[g]) {
                 break;
             }
         }
         let mean = |a: &[Pull], b: &[Pull]| {
-            a.iter()
-                .zip(b)
-                .map(|(a, b)| std::array::from_fn(|g| 0.5 * (a[g] + b[g])))
-                .collect()
+            let mean = |(a, b): (&Pull, &Pull)| {
+                let (a, b) = (a.get(), b.get());
+                Pull::of(std::array::from_fn(|g| 0.5 * (a[g] + b[g])))
+            };
+            a.par_iter().zip(b).map(mean).collect()
         };
         let far_start = world.ends.far_start() as usize;
         Change {
@@ -142,13 +135,13 @@ impl Spread<'_> {
         }
     }
 
-    fn collect(&self, change: &Change, sum: &mut Variances) {
-        let Change {
-            irradiance: change,
-            far,
-        } = change;
+    /// Adds the variances in band `k` of the group, whose changes are in units of `unit`.
+    fn collect(&self, of: &Change, (k, unit): (usize, f64), sum: &mut Variances) {
+        let pull = |of: &Pull| of.of_band(k).map(|x| x * unit);
+        let change: Vec<PerBatch> = of.irradiance.iter().map(pull).collect();
+        let far: Vec<PerBatch> = of.far.iter().map(pull).collect();
         let (scene, elements) = (&self.system.problem.scene, self.system.world.elements.len());
-        let band = &self.system.problem.bands[self.band];
+        let band = &self.system.problem.bands[self.bands[k]];
         let soil_triangle = world::is_soil(scene);
         sum.triangle_W2.resize(scene.triangles.len(), 0.0);
         sum.soil_W2_m4
@@ -210,7 +203,7 @@ impl Spread<'_> {
         self.system.world.row_area_m2(row as u32) * self.system.outlook.exposed[row]
     }
 
-    fn escape(&self, balance: &mut [Pull; 4], row: usize, weight: f64, change: &Pull) {
+    fn escape(&self, balance: &mut [PerBatch; 4], row: usize, weight: f64, change: &PerBatch) {
         let outlook = self.system.outlook;
         let part = |of: &[Vec<f64>; 2]| 0.5 * (of[0][row] + of[1][row]);
         add(&mut balance[2], weight * part(&outlook.to_sky), change);
@@ -218,30 +211,30 @@ impl Spread<'_> {
     }
 }
 
-impl<const N: usize> Gather<'_, N> {
-    /// Power that irradiances make all faces absorb, summed without regard to sign, W.
-    fn absorbed(&self, irradiance: &[Lane<N>]) -> Lane<N> {
-        let mut sum = [0.0; N];
-        for (row, lane) in irradiance[..self.world.ends.faces() as usize]
-            .iter()
-            .enumerate()
-        {
-            let area = self.counted_area_m2(row / 2, row % 2);
-            for k in 0..N {
-                sum[k] += area[k] * lane[k].abs();
-            }
+/// A power of two near the largest radiosity in each band: in such units f32 neither overflows nor
+/// vanishes, and a light that is twice as strong has the very same errors, doubled.
+fn units(seen: &[PerBand]) -> PerBand {
+    let largest = seen
+        .iter()
+        .fold([0.0f64; PULLED_TOGETHER], |largest, seen| {
+            std::array::from_fn(|k| largest[k].max(seen[k].abs()))
+        });
+    largest.map(|l| {
+        if l > 0.0 {
+            l.log2().floor().exp2()
+        } else {
+            1.0
         }
-        sum
-    }
+    })
 }
 
-fn add(to: &mut Pull, weight: f64, change: &Pull) {
+fn add(to: &mut PerBatch, weight: f64, change: &PerBatch) {
     for (to, change) in to.iter_mut().zip(change) {
         *to += weight * change;
     }
 }
 
-fn variance(change: &Pull) -> f64 {
+fn variance(change: &PerBatch) -> f64 {
     let batches = HALF_BATCHES as f64;
     batches / (batches - 1.0) * change.iter().map(|c| c * c).sum::<f64>()
 }
