@@ -1,5 +1,6 @@
-//! What the accuracy tests share: scenes built by hand, solves, form factors counted from rows,
-//! statistics. Where an answer comes from is said in the test that needs it.
+//! What the tests share: scenes built by hand, solves, form factors counted from rows, statistics; the
+//! programs as processes, and calls of a master. Where an answer comes from is said in the test that
+//! needs it.
 
 #![allow(
     non_snake_case,
@@ -10,10 +11,13 @@
     reason = "this crate is used by tests only, where a panic is a failure"
 )]
 
+pub mod calls;
 pub mod canopies;
+pub mod desk;
 pub mod enclosure;
 pub mod files;
 pub mod form_factor;
+pub mod processes;
 pub mod reference;
 pub mod scenery;
 pub mod solving;

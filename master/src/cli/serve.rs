@@ -82,9 +82,20 @@ impl LimitFlags {
 
 impl ServeArgs {
     pub(crate) fn run(self) -> Result<()> {
-        let filter = EnvFilter::try_from_env("NESTRAD_LOG");
+        let mut filter =
+            EnvFilter::try_from_env("NESTRAD_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
+        // libraries that would write headers, and with them tokens, into the log
+        for quiet in [
+            "h2=info",
+            "hyper=info",
+            "rustls=info",
+            "tonic=info",
+            "tower=info",
+        ] {
+            filter = filter.add_directive(quiet.parse()?);
+        }
         tracing_subscriber::fmt()
-            .with_env_filter(filter.unwrap_or_else(|_| EnvFilter::new("info")))
+            .with_env_filter(filter)
             .with_writer(std::io::stderr)
             .with_ansi(false)
             .init();

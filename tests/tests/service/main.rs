@@ -1,0 +1,15 @@
+//! The master as a service: real processes, real sockets.
+
+#![allow(
+    non_snake_case,
+    reason = "units in names are written as units: irradiance_W_m2"
+)]
+#![allow(clippy::unwrap_used, reason = "what cannot be set up fails the test")]
+
+mod access;
+mod clients;
+mod garbage;
+mod limits;
+mod many_solves;
+mod results;
+mod stopping;

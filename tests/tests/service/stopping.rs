@@ -1,0 +1,130 @@
+//! Masters that stop, or are stopped.
+
+use nestrad_proto::v1;
+use nestrad_tests::calls::{block_on, client};
+use nestrad_tests::desk::Desk;
+use nestrad_tests::processes::{Master, nestrad, said, signal, until, wait_for};
+
+fn runs(master: &Master) -> bool {
+    let solves = block_on(async {
+        let list = client(master).list_solves(v1::ListSolvesRequest {}).await;
+        list.unwrap().into_inner().solves
+    });
+    solves
+        .iter()
+        .any(|solve| solve.state() == v1::SolveState::Running)
+}
+
+/// Solves a canopy at a master that something happens to meanwhile; gives what the client said.
+fn solve_while(desk: &Desk, master: Master, happens: impl FnOnce(Master)) -> (bool, String) {
+    let url = master.url();
+    let args = ["solve", "maize/scene.toml", "--accuracy", "0.5", "--out"];
+    desk.done(&[&args[..], &["here"]].concat());
+    let there = [&args[..], &["there", "--master", &url]].concat();
+    let child = nestrad(desk.folder(), &there).spawn().unwrap();
+    until("it runs", || runs(&master));
+    happens(master);
+    let output = wait_for(child);
+    (output.status.success(), said(&output))
+}
+
+#[test]
+fn a_master_that_is_told_to_stop_ends_what_it_began() {
+    let desk = Desk::new();
+    desk.maize("maize", "1");
+    let (done, said) = solve_while(&desk, Master::start(&[]), |master| {
+        assert_eq!(master.terminate().code(), Some(0));
+    });
+    assert!(done, "{said}");
+    assert!(desk.tables("here") == desk.tables("there"));
+}
+
+#[test]
+fn a_master_that_is_stopped_takes_nothing_new_and_says_so() {
+    let (desk, master) = (Desk::new(), Master::start(&["--drain", "600"]));
+    desk.maize("maize", "1");
+    let url = master.url();
+    let long = [
+        "solve",
+        "maize/scene.toml",
+        "--accuracy",
+        "0.1",
+        "--out",
+        "out",
+        "--master",
+        &url,
+    ];
+    let child = nestrad(desk.folder(), &long).spawn().unwrap();
+    until("it runs", || runs(&master));
+    signal(master.id(), "TERM");
+    until("it drains", || {
+        master.log().contains("nothing new is taken on")
+    });
+    let refused = block_on(async {
+        let mut client = client(&master);
+        let scene = nestrad_tests::calls::one_leaf();
+        nestrad_tests::calls::upload(&mut client, scene)
+            .await
+            .unwrap_err()
+    });
+    assert_eq!(refused.code(), tonic::Code::Unavailable);
+    assert_eq!(refused.message(), "the master is about to stop");
+    signal(child.id(), "TERM");
+    assert_eq!(wait_for(child).status.code(), Some(1));
+    assert_eq!(master.terminate().code(), Some(0));
+}
+
+#[test]
+fn a_time_to_drain_that_is_over_cancels() {
+    let (desk, master) = (Desk::new(), Master::start(&["--drain", "0"]));
+    desk.maize("maize", "1");
+    let url = master.url();
+    let long = [
+        "solve",
+        "maize/scene.toml",
+        "--accuracy",
+        "0.1",
+        "--out",
+        "out",
+        "--master",
+        &url,
+    ];
+    let child = nestrad(desk.folder(), &long).spawn().unwrap();
+    until("it runs", || runs(&master));
+    assert_eq!(master.terminate().code(), Some(0));
+    let output = wait_for(child);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(!desk.path("out").exists());
+}
+
+#[test]
+fn a_master_that_is_killed_and_started_again_gives_the_same_bytes() {
+    let desk = Desk::new();
+    desk.maize("maize", "1");
+    let mut again = None;
+    let (done, said) = solve_while(&desk, Master::start(&[]), |master| {
+        let address = master.address.to_string();
+        master.kill();
+        again = Some(Master::start_at(&address, &[]));
+    });
+    assert!(done, "{said}");
+    assert!(said.contains("the master is away"), "{said}");
+    assert!(desk.tables("here") == desk.tables("there"));
+}
+
+#[test]
+fn a_master_that_is_not_there_is_given_up() {
+    let desk = Desk::new();
+    let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+    let url = format!("http://{}", free.local_addr().unwrap());
+    drop(free);
+    let output = desk.run(&["solve", "scene.toml", "--out", "out", "--master", &url]);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(
+        said(&output).contains("cannot be reached"),
+        "{}",
+        said(&output)
+    );
+    let output = desk.run(&["status", "--master", &url]);
+    assert_eq!(output.status.code(), Some(1));
+}
