@@ -6,6 +6,7 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod cluster;
 pub mod direct;
 pub mod exchange;
 pub mod far_field;

@@ -6,6 +6,7 @@
 //! for any number of threads.
 
 mod block;
+mod kernel;
 mod lines;
 mod memory;
 mod part;
@@ -13,6 +14,7 @@ mod rays;
 mod rows;
 
 pub use block::{Block, BlockFault};
+pub use kernel::kernel;
 pub use memory::Demand;
 pub use rays::Tracer;
 
