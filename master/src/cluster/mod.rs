@@ -1,3 +1,212 @@
-//! Workers on other machines, or in other processes: who computes which job of the exchange.
+//! Workers on other machines, or in other processes: they join, lease jobs, and return rows.
+//!
+//! The scheduler decides, without clock or network; the service speaks with workers on tokio's threads;
+//! rows are checked and joined on threads of their own.
 
+mod receive;
 pub mod scheduler;
+mod service;
+mod solving;
+
+use std::collections::HashMap;
+use std::hash::{BuildHasher, RandomState};
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::{Duration, Instant};
+
+use nestrad_proto::v1::worker_service_server::WorkerServiceServer;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tokio::sync::{Notify, Semaphore};
+
+use scheduler::{Id, Rules, Scheduler, SolveCounts, Time, WorkerCounts};
+use solving::Open;
+
+/// What a master allows its workers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Limits {
+    /// Times and counts of the scheduler.
+    pub rules: Rules,
+    /// How often a worker is to be heard of.
+    pub heartbeat: Duration,
+    /// Bytes of results that are on their way in at a time; no single result is larger.
+    pub result_bytes: u32,
+    /// Workers at a time.
+    pub workers: usize,
+}
+
+impl Default for Limits {
+    fn default() -> Self {
+        let rules = Rules::default();
+        Self {
+            heartbeat: rules.lease / 6,
+            rules,
+            result_bytes: 1 << 30,
+            workers: 4096,
+        }
+    }
+}
+
+impl Limits {
+    /// These limits with another lease time, and heartbeats to fit.
+    #[must_use]
+    pub fn with_lease(mut self, lease: Duration) -> Self {
+        self.rules.lease = lease;
+        self.heartbeat = lease / 6;
+        self
+    }
+}
+
+/// The workers of a master, and what they work at. Clones are the same cluster.
+#[derive(Clone)]
+pub struct Cluster(Arc<Shared>);
+
+struct Shared {
+    limits: Limits,
+    begun: Instant,
+    state: Mutex<State>,
+    /// There may be something to lease.
+    changed: Notify,
+    /// A worker has joined.
+    joined: Condvar,
+    /// Kibibytes of results that may come in now.
+    room: Semaphore,
+    /// Where rows are checked and joined.
+    compute: ThreadPool,
+    totals: Totals,
+}
+
+struct State {
+    scheduler: Scheduler,
+    solves: HashMap<Id, Open>,
+    draining: bool,
+}
+
+/// What has been done since the start.
+#[derive(Debug, Default)]
+struct Totals {
+    bytes_in: AtomicU64,
+    bytes_out: AtomicU64,
+    results: AtomicU64,
+    refused: AtomicU64,
+    segments: AtomicU64,
+    rays: AtomicU64,
+}
+
+/// The state of a cluster at one moment.
+#[derive(Clone, Debug, Default)]
+pub struct ClusterStatus {
+    /// Every worker that is known.
+    pub workers: Vec<WorkerCounts>,
+    /// Jobs of all solves together.
+    pub jobs: SolveCounts,
+    /// What those jobs that are not done should take, seconds on one thread.
+    pub left_s: f64,
+    /// Bytes of rows that came in, and of blocks that went out, since the start.
+    pub bytes_in: u64,
+    /// See `bytes_in`.
+    pub bytes_out: u64,
+    /// Results that were taken, and that were refused.
+    pub results: u64,
+    /// See `results`.
+    pub refused: u64,
+    /// Leases that were lost or failed.
+    pub lost: u64,
+    /// Segments and rays of all results.
+    pub segments: u64,
+    /// See `segments`.
+    pub rays: u64,
+}
+
+impl Cluster {
+    /// A cluster without workers, that checks and joins rows on so many threads, 0 for one per
+    /// processor. To be called within a tokio runtime.
+    pub fn start(limits: Limits, threads: usize) -> Result<Self, ThreadPoolBuildError> {
+        let compute = ThreadPoolBuilder::new().num_threads(threads).build()?;
+        // what a master before this one gave out is not to be taken for this one's
+        let first_id = RandomState::new().hash_one(Instant::now()) >> 1;
+        let shared = Arc::new(Shared {
+            begun: Instant::now(),
+            state: Mutex::new(State {
+                scheduler: Scheduler::new(limits.rules, first_id),
+                solves: HashMap::new(),
+                draining: false,
+            }),
+            changed: Notify::new(),
+            joined: Condvar::new(),
+            room: Semaphore::new(kibibytes(u64::from(limits.result_bytes)) as usize),
+            compute,
+            totals: Totals::default(),
+            limits,
+        });
+        tokio::spawn(watch(Arc::downgrade(&shared)));
+        Ok(Self(shared))
+    }
+
+    /// The service that workers call.
+    pub fn service(&self) -> WorkerServiceServer<service::Service> {
+        service::server(self.clone())
+    }
+
+    /// Tells all workers to leave as soon as they ask for a job.
+    pub fn drain(&self) {
+        self.lock().draining = true;
+        self.0.changed.notify_waiters();
+    }
+
+    /// How it stands.
+    pub fn status(&self) -> ClusterStatus {
+        let now = self.now();
+        let state = self.lock();
+        let workers = state.scheduler.workers(now);
+        let mut jobs = SolveCounts::default();
+        for solve in state.solves.keys() {
+            jobs += state.scheduler.counts(*solve).unwrap_or_default();
+        }
+        let totals = &self.0.totals;
+        let of = |total: &AtomicU64| total.load(Ordering::Relaxed);
+        ClusterStatus {
+            workers,
+            jobs,
+            left_s: state.scheduler.left_s(),
+            bytes_in: of(&totals.bytes_in),
+            bytes_out: of(&totals.bytes_out),
+            results: of(&totals.results),
+            refused: of(&totals.refused),
+            lost: state.scheduler.lost(),
+            segments: of(&totals.segments),
+            rays: of(&totals.rays),
+        }
+    }
+
+    fn now(&self) -> Time {
+        self.0.begun.elapsed()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, State> {
+        // the state is whole between any two calls of the scheduler
+        self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// How often it is looked whether leases are overdue, or jobs take too long.
+const TICK: Duration = Duration::from_millis(100);
+
+/// Takes back what is overdue, for as long as there is a cluster.
+async fn watch(cluster: Weak<Shared>) {
+    let mut tick = tokio::time::interval(TICK);
+    tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        tick.tick().await;
+        let Some(shared) = cluster.upgrade() else {
+            return;
+        };
+        let cluster = Cluster(shared);
+        let now = cluster.now();
+        cluster.lock().scheduler.expire(now);
+        cluster.0.changed.notify_waiters();
+    }
+}
+
+fn kibibytes(bytes: u64) -> u32 {
+    u32::try_from(bytes.div_ceil(1 << 10)).unwrap_or(u32::MAX)
+}

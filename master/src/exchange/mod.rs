@@ -119,6 +119,9 @@ pub enum ExchangeError {
     /// The kernel refused a block.
     #[error("near-field job refused")]
     Block(#[from] nestrad_worker::BlockFault),
+    /// The workers could not do it.
+    #[error("{0}")]
+    Failed(String),
     /// Packed rows cannot be read.
     #[error("near-field result cannot be read")]
     Packed(#[from] PackedFault),

@@ -103,15 +103,6 @@ pub enum Refusal {
     TooMany(usize),
 }
 
-/// What becomes of a result.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Use {
-    /// It is the one.
-    Used,
-    /// Another was faster, or nobody waits for it.
-    NotUsed,
-}
-
 /// The state of all workers, solves and leases.
 #[derive(Debug)]
 pub struct Scheduler {
@@ -120,6 +111,7 @@ pub struct Scheduler {
     workers: BTreeMap<Id, Worker>,
     solves: BTreeMap<Id, Solve>,
     leases: BTreeMap<Id, Lease>,
+    lost: u64,
 }
 
 /// A job that was given out.
@@ -143,12 +135,8 @@ impl Scheduler {
             workers: BTreeMap::new(),
             solves: BTreeMap::new(),
             leases: BTreeMap::new(),
+            lost: 0,
         }
-    }
-
-    /// The rules in force.
-    pub fn rules(&self) -> &Rules {
-        &self.rules
     }
 
     fn new_id(&mut self) -> Id {
@@ -280,20 +268,16 @@ impl Scheduler {
         }))
     }
 
-    /// A result is here, and good. `compute_s` is what the worker says it took.
-    pub fn finish(&mut self, now: Time, worker: Id, lease: Id, compute_s: f64) -> Use {
-        // work is work, even of a worker that is not known any more
-        let _ = self.contact(now, worker);
+    /// A result is here, and good; `compute_s` is what the worker says it took. Gives the job that it is
+    /// of, or nothing where another was faster or nobody waits for it.
+    pub fn finish(&mut self, now: Time, worker: Id, lease: Id, compute_s: f64) -> Option<Leased> {
+        self.contact(now, worker).ok()?;
         let held = self.leases.get(&lease).copied();
-        let Some(held) = held.filter(|l| l.worker == worker) else {
-            return Use::NotUsed;
-        };
+        let held = held.filter(|l| l.worker == worker)?;
         if let Some(known) = self.workers.get_mut(&held.worker) {
             known.counts.done += 1;
         }
-        let Some(solve) = self.solves.get_mut(&held.solve) else {
-            return Use::NotUsed;
-        };
+        let solve = self.solves.get_mut(&held.solve)?;
         solve.took(held.job, compute_s);
         let used = solve.done(held.job);
         // other leases of the job are void
@@ -305,7 +289,12 @@ impl Scheduler {
             }
             !same
         });
-        if used { Use::Used } else { Use::NotUsed }
+        used.then_some(Leased {
+            lease,
+            solve: held.solve,
+            job: held.job,
+            block: solve.jobs[held.job].spec.block,
+        })
     }
 
     /// A worker does not want, or was not able, to do a job; or its result was refused.
@@ -374,6 +363,16 @@ impl Scheduler {
         self.solves.get(&solve).map(Solve::counts)
     }
 
+    /// What the jobs that are not done should take, seconds on one thread.
+    pub fn left_s(&self) -> f64 {
+        self.solves.values().map(Solve::left_s).sum()
+    }
+
+    /// Leases that were lost or failed since the start.
+    pub fn lost(&self) -> u64 {
+        self.lost
+    }
+
     /// All workers.
     pub fn workers(&self, now: Time) -> Vec<WorkerCounts> {
         self.workers.values().map(|w| w.counts(now)).collect()
@@ -392,6 +391,7 @@ impl Scheduler {
     }
 
     fn failed(&mut self, lease: &Lease, reason: &str) {
+        self.lost += 1;
         let name = match self.workers.get_mut(&lease.worker) {
             Some(worker) => {
                 worker.counts.lost += 1;

@@ -2,6 +2,7 @@
 
 use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::AddAssign;
 
 use super::worker::Worker;
 use super::{BlockSpec, Id, JobSpec, Rules};
@@ -24,6 +25,14 @@ pub struct SolveCounts {
     pub leased: usize,
     /// Are done.
     pub done: usize,
+}
+
+impl AddAssign for SolveCounts {
+    fn add_assign(&mut self, more: Self) {
+        self.waiting += more.waiting;
+        self.leased += more.leased;
+        self.done += more.done;
+    }
 }
 
 #[derive(Debug)]
@@ -168,6 +177,11 @@ impl Solve {
             1.0
         };
         factor * self.jobs[job].spec.cost_s
+    }
+
+    pub(super) fn left_s(&self) -> f64 {
+        let left = self.jobs.iter().enumerate().filter(|(_, job)| !job.done);
+        left.map(|(k, _)| self.expected_s(k)).sum()
     }
 
     /// How the solve ends, once it does.

@@ -105,14 +105,14 @@ fn a_lease_without_heartbeat_goes_to_another_and_its_late_result_is_welcome() {
     s.expire(at(50.0));
     let second = lease(&mut s, 50.0, b).unwrap();
     assert_eq!(second.job, first.job);
-    assert_eq!(s.finish(at(51.0), a, first.lease, 1.0), Use::Used);
+    assert!(s.finish(at(51.0), a, first.lease, 1.0).is_some());
     assert_eq!(s.outcome(solve), Some(Outcome::Done));
     assert_eq!(
         s.renew(at(51.0), b, &[second.lease]),
         Ok(vec![second.lease])
     );
-    assert_eq!(s.finish(at(51.0), b, second.lease, 1.0), Use::NotUsed);
-    assert_eq!(s.finish(at(51.0), a, first.lease, 1.0), Use::NotUsed);
+    assert_eq!(s.finish(at(51.0), b, second.lease, 1.0), None);
+    assert_eq!(s.finish(at(51.0), a, first.lease, 1.0), None);
 }
 
 #[test]
@@ -130,7 +130,7 @@ fn a_straggler_is_given_out_once_more_when_nothing_waits() {
     assert_eq!(again.job, slow.job);
     // two are enough
     assert_eq!(lease(&mut s, 9.0, workers[2]), None);
-    assert_eq!(s.finish(at(2.0), workers[1], again.lease, 0.5), Use::Used);
+    assert!(s.finish(at(2.0), workers[1], again.lease, 0.5).is_some());
     assert_eq!(s.wanted(at(2.0), workers[0], slow.lease), Ok(None));
 }
 
@@ -207,7 +207,7 @@ fn silent_workers_are_forgotten_and_strangers_turned_away() {
         s.wanted(at(60.0), c, own.lease),
         Err(Refusal::UnknownLease(own.lease))
     );
-    assert_eq!(s.finish(at(60.0), c, own.lease, 1.0), Use::NotUsed);
+    assert_eq!(s.finish(at(60.0), c, own.lease, 1.0), None);
     assert_eq!(s.renew(at(60.0), c, &[own.lease]), Ok(vec![own.lease]));
 }
 
@@ -297,7 +297,8 @@ fn pick<T: Copy>(of: &[T], k: usize) -> Option<T> {
 
 impl World {
     fn finish(&mut self, worker: Id, leased: Leased) {
-        if self.s.finish(at(self.now), worker, leased.lease, 1.0) == Use::Used {
+        if let Some(done) = self.s.finish(at(self.now), worker, leased.lease, 1.0) {
+            assert_eq!(done, leased);
             *self.results.entry((leased.solve, leased.job)).or_default() += 1;
             self.used.push((worker, leased));
         }
@@ -331,7 +332,7 @@ impl World {
             }
             Event::FinishAgain(k) => {
                 if let Some((worker, leased)) = pick(&self.used, k) {
-                    assert_eq!(self.s.finish(now, worker, leased.lease, 1.0), Use::NotUsed);
+                    assert_eq!(self.s.finish(now, worker, leased.lease, 1.0), None);
                 }
             }
             Event::GiveBack(k, failed) => {

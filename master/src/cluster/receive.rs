@@ -1,0 +1,127 @@
+//! Rows on their way in: nothing in them is trusted.
+
+use std::time::Duration;
+
+use bytes::Bytes;
+use nestrad_proto::packed;
+use nestrad_proto::v1::{ReturnRowsRequest, RowsHeader, return_rows_request};
+use tonic::{Code, Status, Streaming};
+
+use crate::exchange::{JobRows, Traced};
+
+/// What a result has to fit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Expected {
+    pub(super) rows: u32,
+    pub(super) ends: u32,
+    pub(super) most_bytes: u64,
+}
+
+/// No count of lines, segments or rays is larger.
+const MOST_COUNTED: u64 = 1 << 48;
+
+/// The next message of a stream; an error where none comes in time.
+pub(super) async fn next(
+    stream: &mut Streaming<ReturnRowsRequest>,
+    patience: Duration,
+) -> Result<Option<return_rows_request::Part>, Status> {
+    let message = tokio::time::timeout(patience, stream.message())
+        .await
+        .map_err(|_| Status::deadline_exceeded("rows stopped coming"))??;
+    match message {
+        None => Ok(None),
+        Some(ReturnRowsRequest { part: Some(part) }) => Ok(Some(part)),
+        Some(ReturnRowsRequest { part: None }) => {
+            Err(Status::invalid_argument("expected a header or a chunk"))
+        }
+    }
+}
+
+/// Refuses what a header promises to be too large or not to fit, before any memory is taken.
+pub(super) fn check_header(header: &RowsHeader, expected: &Expected) -> Result<(), Status> {
+    let fault = |what: &str, found: u64, limit: u64| {
+        Err(Status::invalid_argument(format!(
+            "result with {found} {what}, expected {limit}"
+        )))
+    };
+    let (rows, entries) = (u64::from(header.rows), header.entries);
+    if header.rows != expected.rows {
+        return fault("rows", rows, u64::from(expected.rows));
+    }
+    let end_bytes = packed::end_bytes(expected.ends as usize);
+    if header.end_bytes as usize != end_bytes {
+        let found = u64::from(header.end_bytes);
+        return fault("bytes an entry", found, end_bytes as u64);
+    }
+    if header.packed_bytes > expected.most_bytes {
+        return fault("bytes", header.packed_bytes, expected.most_bytes);
+    }
+    if entries > header.packed_bytes / end_bytes as u64
+        || header.packed_bytes > packed::most_bytes(rows, entries, end_bytes)
+    {
+        let fits = header.packed_bytes / end_bytes as u64;
+        return fault("entries for its bytes", entries, fits);
+    }
+    if header.checksum.len() != 32 {
+        return fault("bytes of checksum", header.checksum.len() as u64, 32);
+    }
+    let counted = header.lines.max(header.segments).max(header.rays);
+    if counted > MOST_COUNTED {
+        return fault("lines, segments or rays", counted, MOST_COUNTED);
+    }
+    Ok(())
+}
+
+/// All chunks of a result: as many bytes as its header says.
+pub(super) async fn body(
+    stream: &mut Streaming<ReturnRowsRequest>,
+    header: &RowsHeader,
+    patience: Duration,
+) -> Result<Vec<u8>, Status> {
+    let size = header.packed_bytes as usize;
+    let mut body = Vec::with_capacity(size);
+    while let Some(part) = next(stream, patience).await? {
+        let return_rows_request::Part::Chunk(chunk) = part else {
+            return Err(Status::invalid_argument("expected a chunk, found a header"));
+        };
+        if chunk.len() > size - body.len() {
+            let found = body.len() + chunk.len();
+            let text = format!("result of {found} bytes or more, expected {size}");
+            return Err(Status::invalid_argument(text));
+        }
+        body.extend_from_slice(&chunk);
+    }
+    if body.len() < size {
+        let text = format!("result of {} bytes, expected {size}", body.len());
+        return Err(Status::invalid_argument(text));
+    }
+    Ok(body)
+}
+
+/// Checks every number of a result.
+pub(super) fn check_body(
+    header: &RowsHeader,
+    body: Vec<u8>,
+    expected: &Expected,
+) -> Result<JobRows, Status> {
+    if blake3::hash(&body).as_bytes()[..] != header.checksum[..] {
+        return Err(Status::data_loss("result does not match its checksum"));
+    }
+    let rows = u64::from(expected.rows);
+    packed::check(&body, rows, header.entries, expected.ends)
+        .map_err(|fault| Status::invalid_argument(fault.to_string()))?;
+    Ok(JobRows {
+        packed: Bytes::from(body),
+        traced: Traced {
+            lines: header.lines,
+            segments: header.segments,
+            rays: header.rays,
+            row_entries: header.entries,
+        },
+    })
+}
+
+/// Whether an error says that the result is bad, rather than that the connection is.
+pub(super) fn is_fault(status: &Status) -> bool {
+    matches!(status.code(), Code::InvalidArgument | Code::DataLoss)
+}

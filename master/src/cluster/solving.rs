@@ -1,0 +1,185 @@
+//! The exchange of a solve, computed by workers.
+
+use std::sync::Arc;
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError, Sender};
+use std::time::Duration;
+
+use bytes::Bytes;
+use nestrad_common::scene::Scene;
+use nestrad_proto::v1;
+use nestrad_worker::Demand;
+use prost::Message;
+use rayon::prelude::*;
+
+use super::Cluster;
+use super::scheduler::{BlockId, BlockSpec, Id, JobSpec, Outcome};
+use crate::exchange::{
+    Assembly, BlockOf, Exchange, ExchangeError, JobOf, JobRows, Sampling, SmallestWorker, batches,
+    block_message, demand, partition, split,
+};
+use crate::output::progress::Progress;
+use crate::world::World;
+
+/// How long a thread sleeps before it looks whether it is still wanted.
+const PATIENCE: Duration = Duration::from_millis(100);
+
+/// A solve at which workers work.
+pub(super) struct Open {
+    pub(super) blocks: Arc<[SentBlock]>,
+    pub(super) batches: Arc<[v1::Batch]>,
+    pub(super) jobs: Arc<[JobOf]>,
+    /// Number of ends of its world.
+    pub(super) ends: u32,
+    pub(super) results: Sender<(usize, JobRows)>,
+}
+
+/// A block as it is sent.
+pub(super) struct SentBlock {
+    pub(super) id: BlockId,
+    /// The encoded message.
+    pub(super) bytes: Bytes,
+    pub(super) rows: u32,
+    pub(super) demand: Demand,
+}
+
+impl SentBlock {
+    fn new(scene: &Scene, world: &World, block: &BlockOf, sampling: &Sampling) -> Self {
+        let bytes = block_message(scene, world, block).encode_to_vec();
+        let demand = demand(world, block, sampling);
+        Self {
+            id: *blake3::hash(&bytes).as_bytes(),
+            bytes: bytes.into(),
+            rows: demand.rows as u32,
+            demand,
+        }
+    }
+}
+
+impl Cluster {
+    /// Has all batches traced by the workers. Waits for the first of them, which may come at any time.
+    pub fn trace(
+        &self,
+        scene: &Scene,
+        world: &World,
+        sampling: &Sampling,
+        progress: &Progress,
+    ) -> Result<Exchange, ExchangeError> {
+        progress.stage("waiting for a worker", 0);
+        let worker = self.smallest_worker(progress)?;
+        let (blocks, sent, batches, jobs) = self.0.compute.install(|| {
+            let blocks = partition(scene, world, sampling, worker)?;
+            let batches = batches(sampling);
+            let jobs = split(world, &blocks, &batches, sampling);
+            let sent: Vec<SentBlock> = blocks
+                .par_iter()
+                .map(|block| SentBlock::new(scene, world, block, sampling))
+                .collect();
+            Ok::<_, ExchangeError>((blocks, sent, batches, jobs))
+        })?;
+        let jobs: Arc<[JobOf]> = jobs.into();
+        let mut assembly = Assembly::new(world, &blocks, jobs.clone(), sampling.batches);
+        progress.stage("exchange", jobs.len() as u64);
+        let running = self.begin(sent, batches, jobs.clone(), world);
+        for _ in 0..jobs.len() {
+            let (job, rows) = running.next(progress)?;
+            self.0.compute.install(|| assembly.put(job, rows))?;
+            progress.inc(1);
+        }
+        drop(running);
+        let exchange = self.0.compute.install(|| assembly.finish());
+        exchange.ok_or_else(|| ExchangeError::Failed("jobs without result".to_owned()))
+    }
+
+    /// The least memory for each thread decides: a block is to fit every worker there is.
+    fn smallest_worker(&self, progress: &Progress) -> Result<SmallestWorker, ExchangeError> {
+        let mut state = self.lock();
+        loop {
+            progress.check()?;
+            let smallest = state
+                .scheduler
+                .facts()
+                .map(|facts| SmallestWorker {
+                    memory_bytes: facts.memory_bytes,
+                    threads: facts.threads,
+                })
+                .min_by_key(|w| (w.memory_bytes / u64::from(w.threads.max(1)), w.threads));
+            if let Some(smallest) = smallest {
+                return Ok(smallest);
+            }
+            let waited = self.0.joined.wait_timeout(state, PATIENCE);
+            state = waited.unwrap_or_else(std::sync::PoisonError::into_inner).0;
+        }
+    }
+
+    fn begin(
+        &self,
+        blocks: Vec<SentBlock>,
+        batches: Vec<v1::Batch>,
+        jobs: Arc<[JobOf]>,
+        world: &World,
+    ) -> Running<'_> {
+        let (sender, results) = mpsc::channel();
+        let block_specs = blocks.iter().map(|b| BlockSpec {
+            id: b.id,
+            demand: b.demand,
+        });
+        let job_specs = jobs.iter().map(|j| JobSpec {
+            block: j.block,
+            cost_s: j.cost_s,
+        });
+        let mut state = self.lock();
+        let id = state
+            .scheduler
+            .begin(block_specs.collect(), job_specs.collect());
+        let open = Open {
+            blocks: blocks.into(),
+            batches: batches.into(),
+            jobs,
+            ends: world.ends.len() as u32,
+            results: sender,
+        };
+        state.solves.insert(id, open);
+        drop(state);
+        self.0.changed.notify_waiters();
+        Running {
+            cluster: self,
+            id,
+            results,
+        }
+    }
+}
+
+/// A solve in the hands of the scheduler, which lets go of it with this.
+struct Running<'a> {
+    cluster: &'a Cluster,
+    id: Id,
+    results: Receiver<(usize, JobRows)>,
+}
+
+impl Running<'_> {
+    /// The next result, whichever job it is of.
+    fn next(&self, progress: &Progress) -> Result<(usize, JobRows), ExchangeError> {
+        loop {
+            match self.results.recv_timeout(PATIENCE) {
+                Ok(result) => return Ok(result),
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => {
+                    return Err(ExchangeError::Failed("the workers are gone".to_owned()));
+                }
+            }
+            progress.check()?;
+            let outcome = self.cluster.lock().scheduler.outcome(self.id);
+            if let Some(Outcome::Failed(reason)) = outcome {
+                return Err(ExchangeError::Failed(reason));
+            }
+        }
+    }
+}
+
+impl Drop for Running<'_> {
+    fn drop(&mut self) {
+        let mut state = self.cluster.lock();
+        state.scheduler.end(self.id);
+        state.solves.remove(&self.id);
+    }
+}
