@@ -1,9 +1,12 @@
-//! A solve from beginning to end, in this process.
+//! A solve from beginning to end.
+
+use std::panic::resume_unwind;
 
 use nestrad_common::problem::Problem;
 use thiserror::Error;
 
-use crate::direct::direct_light;
+use crate::cluster::Cluster;
+use crate::direct::{Direct, direct_light};
 use crate::exchange::{BlockOf, Exchange, ExchangeError, Outlook, Traced, trace_here};
 use crate::far_field::closure::{FarRows, from_layers};
 use crate::output::progress::{Cancelled, Progress};
@@ -50,61 +53,78 @@ pub enum RunError {
     Cancelled(#[from] Cancelled),
 }
 
-/// Solves a problem as planned, or stops at the end of a step if `progress` is told so.
+/// What a solve may use besides this process.
+#[derive(Clone, Copy, Default)]
+pub struct Means<'a> {
+    /// Workers that trace the exchange; without them it is traced here.
+    pub workers: Option<&'a Cluster>,
+}
+
+/// Solves a problem as planned in this process, or stops at the end of a step if `progress` is told so.
 pub fn solve(
     problem: &Problem,
     plan: &Plan,
     progress: &Progress,
     watch: &mut Stopwatch,
 ) -> Result<Finished, RunError> {
+    solve_with(problem, plan, Means::default(), progress, watch)
+}
+
+/// Solves a problem as planned. While workers trace, direct light and far field are computed here.
+pub fn solve_with(
+    problem: &Problem,
+    plan: &Plan,
+    means: Means,
+    progress: &Progress,
+    watch: &mut Stopwatch,
+) -> Result<Finished, RunError> {
     let world = plan.world(problem);
     watch.lap("elements");
     progress.check()?;
-    progress.stage("direct light", 0);
-    let direct = direct_light(
-        problem,
-        &world,
-        &plan.direct_line_areas_m2(problem),
-        plan.seed,
-    );
-    watch.lap("direct light");
-    progress.check()?;
+    let (exchange, meanwhile) = std::thread::scope(|scope| {
+        let tracing = plan.sampling.as_ref().zip(means.workers);
+        let tracing = tracing.map(|(sampling, workers)| {
+            let world = &world;
+            scope.spawn(move || workers.trace(&problem.scene, world, sampling, progress))
+        });
+        // the stage that is shown is the workers', where there are any
+        let shown = tracing.is_none();
+        let meanwhile = Meanwhile::compute(problem, plan, &world, (progress, shown), watch);
+        if meanwhile.is_err() {
+            // the workers need not go on
+            progress.cancel();
+        }
+        let exchange = match (tracing, &plan.sampling) {
+            (Some(tracing), _) => tracing.join().unwrap_or_else(|panic| resume_unwind(panic)),
+            (None, Some(sampling)) if meanwhile.is_ok() => {
+                progress.stage("exchange", u64::from(sampling.batches));
+                let whole = [BlockOf::whole(&world)];
+                trace_here(&problem.scene, &world, &whole, sampling, || {
+                    progress.inc(1);
+                    progress.check()
+                })
+            }
+            _ => Ok(Exchange::default()),
+        };
+        watch.lap("exchange");
+        (exchange, meanwhile)
+    });
+    let (meanwhile, exchange) = (meanwhile?, exchange?);
+    let direct = &meanwhile.direct;
 
-    let mut exchange = Exchange::default();
     let mut outlook = Outlook::default();
     let mut irradiance = Irradiance::default();
-    if let Some(sampling) = &plan.sampling {
-        progress.stage("exchange", u64::from(sampling.batches));
-        exchange = trace_here(
-            &problem.scene,
-            &world,
-            &[BlockOf::whole(&world)],
-            sampling,
-            || {
-                progress.inc(1);
-                progress.check()
-            },
-        )?;
-        watch.lap("exchange");
-        progress.stage("far field", 0);
-        outlook = exchange.outlook(&world);
-        let far = plan
-            .far_field
-            .map(|f| FarRows::trace(problem, &world, &f))
-            .transpose()
-            .map_err(ExchangeError::from)?;
-        let fixed_W_m2 = fixed(problem, &world, plan);
-        watch.lap("far field");
-        progress.check()?;
+    if plan.sampling.is_some() {
         progress.stage("solve", 0);
+        outlook = exchange.outlook(&world);
         let system = System {
             problem,
             world: &world,
             exchange: &exchange,
             outlook: &outlook,
-            far: far.as_ref(),
+            far: meanwhile.far.as_ref(),
             direct_W_m2: &direct.irradiance_W_m2,
-            fixed_W_m2: &fixed_W_m2,
+            fixed_W_m2: &meanwhile.fixed_W_m2,
             incoming_W: &direct.incoming_W,
         };
         irradiance = system.solve(&plan.scattering_bands, &plan.tolerance)?;
@@ -115,7 +135,7 @@ pub fn solve(
     let parts = Parts {
         problem,
         world: &world,
-        direct: &direct,
+        direct,
         outlook: &outlook,
         irradiance: &irradiance,
         scattering: &plan.scattering_bands,
@@ -130,6 +150,48 @@ pub fn solve(
         passes: irradiance.passes,
     };
     Ok(Finished { solution, counters })
+}
+
+/// What is computed while workers trace.
+struct Meanwhile {
+    direct: Direct,
+    far: Option<FarRows>,
+    fixed_W_m2: Vec<f64>,
+}
+
+impl Meanwhile {
+    fn compute(
+        problem: &Problem,
+        plan: &Plan,
+        world: &World,
+        (progress, shown): (&Progress, bool),
+        watch: &mut Stopwatch,
+    ) -> Result<Self, RunError> {
+        let stage = |name: &str| {
+            if shown {
+                progress.stage(name, 0);
+            }
+        };
+        stage("direct light");
+        let areas_m2 = plan.direct_line_areas_m2(problem);
+        let direct = direct_light(problem, world, &areas_m2, plan.seed);
+        watch.lap("direct light");
+        progress.check()?;
+        let (mut far, mut fixed_W_m2) = (None, Vec::new());
+        if plan.sampling.is_some() {
+            stage("far field");
+            let rows = plan.far_field.map(|f| FarRows::trace(problem, world, &f));
+            far = rows.transpose().map_err(ExchangeError::from)?;
+            fixed_W_m2 = fixed(problem, world, plan);
+            watch.lap("far field");
+            progress.check()?;
+        }
+        Ok(Self {
+            direct,
+            far,
+            fixed_W_m2,
+        })
+    }
 }
 
 /// Radiosities of what is not a row: dark, but for the unshaded soil beyond the map of an open scene and

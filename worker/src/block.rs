@@ -164,6 +164,11 @@ impl Block {
         })
     }
 
+    /// Number of ends of the whole scene.
+    pub fn ends(&self) -> usize {
+        self.ends.len()
+    }
+
     /// The local number of an end that is not a face.
     pub(crate) fn local(&self, end: u32) -> u32 {
         end - self.ends.faces() + self.local_faces

@@ -12,13 +12,19 @@ mod memory;
 mod part;
 mod rays;
 mod rows;
+pub mod serving;
 
 pub use block::{Block, BlockFault};
 pub use kernel::kernel;
-pub use memory::Demand;
+pub use memory::{BASE_BYTES, Demand};
 pub use rays::Tracer;
 
 use nestrad_proto::v1;
+
+/// Computes the lines of a batch of a block, without its rays.
+pub fn trace_lines(block: &Block, batch: &v1::Batch) -> v1::Rows {
+    rows::collect(block, &lines::trace(block, batch))
+}
 
 /// Computes one batch of a block.
 ///

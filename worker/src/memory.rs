@@ -4,7 +4,7 @@
 //! process.
 
 /// What a process takes before it holds anything: program, threads, network buffers.
-const BASE_BYTES: u64 = 48 << 20;
+pub const BASE_BYTES: u64 = 48 << 20;
 
 /// Sizes of a block, and of the largest job over it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,0 +1,152 @@
+//! The command line of a worker.
+
+use std::fs;
+use std::io::Read;
+use std::process::ExitCode;
+use std::thread;
+
+use anyhow::{Context, Result};
+use clap::Parser;
+use clap::builder::RangedU64ValueParser;
+use nestrad_proto::channel::{Credentials, connect};
+use nestrad_worker::serving::{Offer, serve};
+use tokio::runtime::Builder;
+use tokio::signal::unix::{SignalKind, signal};
+use tokio::sync::watch;
+use tracing_subscriber::EnvFilter;
+
+/// Computes near-field jobs for a nestrad master.
+///
+/// It dials the master, and can come and go at any time. SIGTERM or Ctrl-C lets it finish or give back
+/// its jobs and leave. Logs go to stderr; RUST_LOG says how much.
+#[derive(Debug, Parser)]
+#[command(name = "nestrad-worker", version)]
+pub(crate) struct Cli {
+    /// The master: http://HOST:PORT or https://HOST:PORT
+    #[arg(long, value_name = "URL")]
+    master: String,
+
+    /// Jobs to compute at a time, one a thread; 0 for one per processor
+    #[arg(long, value_name = "N", default_value_t = 0,
+          value_parser = RangedU64ValueParser::<u32>::new().range(0..=4096))]
+    threads: u32,
+
+    /// Memory that it may take, GiB [default: three quarters of what the machine has free]
+    #[arg(long, value_name = "GIB", value_parser = positive)]
+    memory: Option<f64>,
+
+    /// What the master calls it [default: the host's name]
+    #[arg(long, value_name = "NAME")]
+    name: Option<String>,
+
+    /// Leave when stdin closes: for a parent that may die
+    #[arg(long)]
+    with_stdin: bool,
+
+    #[command(flatten)]
+    credentials: Credentials,
+}
+
+impl Cli {
+    pub(crate) fn run(self) -> ExitCode {
+        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
+        tracing_subscriber::fmt()
+            .with_env_filter(filter)
+            .with_writer(std::io::stderr)
+            .init();
+        match self.serve() {
+            Ok(()) => ExitCode::SUCCESS,
+            Err(error) => {
+                tracing::error!("{error:#}");
+                ExitCode::FAILURE
+            }
+        }
+    }
+
+    fn serve(self) -> Result<()> {
+        // calls and heartbeats have threads of their own, next to those that compute
+        let runtime = Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()
+            .context("cannot start threads")?;
+        runtime.block_on(async {
+            let offer = self.offer();
+            let (stop, stopped) = watch::channel(false);
+            let mut terminate = signal(SignalKind::terminate()).context("no SIGTERM")?;
+            let mut interrupt = signal(SignalKind::interrupt()).context("no SIGINT")?;
+            tokio::spawn(async move {
+                tokio::select! {
+                    _ = terminate.recv() => {}
+                    _ = interrupt.recv() => {}
+                }
+                tracing::info!("told to stop");
+                // nobody listens where it has stopped already
+                let _ = stop.send(true);
+            });
+            if self.with_stdin {
+                thread::spawn(die_with_stdin);
+            }
+            let channel = connect(&self.master, &self.credentials)?;
+            serve(channel, offer, stopped).await?;
+            tracing::info!("left");
+            Ok(())
+        })
+    }
+
+    fn offer(&self) -> Offer {
+        const GIB: f64 = (1u64 << 30) as f64;
+        let processors = thread::available_parallelism().map_or(1, |n| n.get() as u32);
+        let memory = self.memory.map(|gib| (gib * GIB) as u64);
+        Offer {
+            name: self.name.clone().unwrap_or_else(host_name),
+            threads: if self.threads == 0 {
+                processors
+            } else {
+                self.threads
+            },
+            memory_bytes: memory.unwrap_or_else(|| free_memory_bytes() / 4 * 3),
+        }
+    }
+}
+
+/// Ends the process when the parent that holds the other end of stdin is gone: there is nobody left to
+/// take a result.
+fn die_with_stdin() {
+    let mut nothing = [0; 64];
+    let mut stdin = std::io::stdin().lock();
+    while stdin.read(&mut nothing).is_ok_and(|n| n > 0) {}
+    std::process::exit(0);
+}
+
+fn host_name() -> String {
+    let name = fs::read_to_string("/proc/sys/kernel/hostname").unwrap_or_default();
+    let name = name.trim();
+    format!(
+        "{}:{}",
+        if name.is_empty() { "worker" } else { name },
+        std::process::id()
+    )
+}
+
+/// What the machine has free, and what the control group allows, whichever is less.
+fn free_memory_bytes() -> u64 {
+    let meminfo = fs::read_to_string("/proc/meminfo").unwrap_or_default();
+    let available = meminfo.lines().find_map(|line| {
+        let kib = line
+            .strip_prefix("MemAvailable:")?
+            .trim()
+            .strip_suffix("kB")?;
+        kib.trim().parse::<u64>().ok()
+    });
+    let allowed = fs::read_to_string("/sys/fs/cgroup/memory.max").ok();
+    let allowed = allowed.and_then(|text| text.trim().parse::<u64>().ok());
+    let least = available.map_or(4 << 30, |kib| kib << 10);
+    allowed.map_or(least, |bytes| bytes.min(least))
+}
+
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|value: &f64| value.is_finite() && *value > 0.0);
+    number.ok_or_else(|| "expected a number above 0".to_owned())
+}
