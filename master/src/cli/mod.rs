@@ -9,6 +9,7 @@ mod remote;
 mod serve;
 mod solve;
 mod status;
+mod workers;
 
 use clap::{Parser, Subcommand};
 

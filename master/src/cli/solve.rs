@@ -20,7 +20,7 @@ use nestrad_master::output::summary::Summary;
 use nestrad_master::output::{self, Formats, TableFormat, terminal};
 use nestrad_master::plan::{Estimator, Plan, Settings};
 use nestrad_master::remote::Remote;
-use nestrad_master::run::{self, Counters, Finished};
+use nestrad_master::run::{self, Counters, Finished, Means};
 use nestrad_master::solution::Solution;
 use rayon::ThreadPoolBuilder;
 
@@ -28,6 +28,7 @@ use super::console::{self, Notes};
 use super::flags::{SceneFlags, positive};
 use super::record::Record;
 use super::remote::MasterFlags;
+use super::workers::{Crew, WorkersFlags};
 
 /// Compute the light that every organ, triangle and soil cell of a canopy gets
 ///
@@ -43,6 +44,9 @@ pub(crate) struct SolveArgs {
 
     #[command(flatten)]
     place: MasterFlags,
+
+    #[command(flatten)]
+    workers: WorkersFlags,
 
     #[command(flatten)]
     results: ResultFlags,
@@ -134,6 +138,7 @@ impl SolveArgs {
                 quiet: self.results.quiet,
             },
             inputs,
+            workers: self.workers,
             out: self.results.out,
             place: self.place,
         };
@@ -162,6 +167,7 @@ fn settings(options: &Options, estimator: EstimatorFlag) -> Settings {
 struct Task {
     inputs: Inputs,
     settings: Settings,
+    workers: WorkersFlags,
     out: PathBuf,
     place: MasterFlags,
     notes: Notes,
@@ -204,7 +210,13 @@ impl Task {
             self.notes.say("plan", line);
         }
         let progress = Progress::new(self.notes.quiet);
-        let Finished { solution, counters } = run::solve(problem, &plan, &progress, watch)?;
+        let crew = self.workers.crew(self.settings.memory_GiB, self.notes)?;
+        let means = Means {
+            workers: crew.as_ref().map(Crew::cluster),
+        };
+        let finished = run::solve_with(problem, &plan, means, &progress, watch)?;
+        let Finished { solution, counters } = finished;
+        drop(crew);
         Ok(Computed {
             solution,
             plan: Box::new(plan),

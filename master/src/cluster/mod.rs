@@ -3,6 +3,8 @@
 //! The scheduler decides, without clock or network; the service speaks with workers on tokio's threads;
 //! rows are checked and joined on threads of their own.
 
+pub mod door;
+pub mod local;
 mod receive;
 pub mod scheduler;
 mod service;
@@ -79,6 +81,8 @@ struct State {
     scheduler: Scheduler,
     solves: HashMap<Id, Open>,
     draining: bool,
+    /// Why nothing can be computed any more.
+    failed: Option<String>,
 }
 
 /// What has been done since the start.
@@ -130,6 +134,7 @@ impl Cluster {
                 scheduler: Scheduler::new(limits.rules, first_id),
                 solves: HashMap::new(),
                 draining: false,
+                failed: None,
             }),
             changed: Notify::new(),
             joined: Condvar::new(),
@@ -151,6 +156,11 @@ impl Cluster {
     pub fn drain(&self) {
         self.lock().draining = true;
         self.0.changed.notify_waiters();
+    }
+
+    /// Ends all solves, now and later: there will be no workers.
+    pub fn fail(&self, reason: &str) {
+        self.lock().failed = Some(reason.to_owned());
     }
 
     /// How it stands.

@@ -11,8 +11,8 @@ use nestrad_worker::Demand;
 use prost::Message;
 use rayon::prelude::*;
 
-use super::Cluster;
 use super::scheduler::{BlockId, BlockSpec, Id, JobSpec, Outcome};
+use super::{Cluster, State};
 use crate::exchange::{
     Assembly, BlockOf, Exchange, ExchangeError, JobOf, JobRows, Sampling, SmallestWorker, batches,
     block_message, demand, partition, split,
@@ -52,6 +52,14 @@ impl SentBlock {
             rows: demand.rows as u32,
             demand,
         }
+    }
+}
+
+impl State {
+    /// Whether anything can be computed.
+    fn check(&self) -> Result<(), ExchangeError> {
+        let failed = self.failed.clone().map(ExchangeError::Failed);
+        failed.map_or(Ok(()), Err)
     }
 }
 
@@ -95,6 +103,7 @@ impl Cluster {
         let mut state = self.lock();
         loop {
             progress.check()?;
+            state.check()?;
             let smallest = state
                 .scheduler
                 .facts()
@@ -168,7 +177,9 @@ impl Running<'_> {
                 }
             }
             progress.check()?;
-            let outcome = self.cluster.lock().scheduler.outcome(self.id);
+            let state = self.cluster.lock();
+            state.check()?;
+            let outcome = state.scheduler.outcome(self.id);
             if let Some(Outcome::Failed(reason)) = outcome {
                 return Err(ExchangeError::Failed(reason));
             }

@@ -1,0 +1,81 @@
+//! The options that say who computes.
+
+use std::net::{Ipv4Addr, SocketAddr};
+use std::time::Duration;
+
+use anyhow::Result;
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use nestrad_master::cluster::door::Door;
+use nestrad_master::cluster::local::{LocalWorkers, Share};
+use nestrad_master::cluster::{Cluster, Limits};
+use nestrad_proto::access::Access;
+
+use super::console::Notes;
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Who computes it")]
+pub(crate) struct WorkersFlags {
+    /// Start so many worker processes on this machine; they share the threads and, besides what this
+    /// process takes, the memory
+    #[arg(long, value_name = "N", conflicts_with = "listen",
+          value_parser = RangedU64ValueParser::<u32>::new().range(1..=1024))]
+    workers: Option<u32>,
+
+    /// Let workers join this solve: `nestrad-worker --master http://ADDRESS`, any number at any time
+    #[arg(long, value_name = "ADDRESS:PORT")]
+    listen: Option<SocketAddr>,
+
+    /// A worker that is silent for so long loses its jobs to others, seconds
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
+    lease: Duration,
+
+    #[command(flatten)]
+    access: Access,
+}
+
+/// Those who compute a solve, besides this process.
+pub(crate) struct Crew {
+    // in the order in which they are dropped: who asks for a job is told to leave through the door
+    door: Door,
+    _local: Option<LocalWorkers>,
+}
+
+impl Crew {
+    pub(crate) fn cluster(&self) -> &Cluster {
+        self.door.cluster()
+    }
+}
+
+impl WorkersFlags {
+    /// Opens the door and starts workers, if any are asked for. To be called where the work is done.
+    pub(crate) fn crew(&self, memory_GiB: f64, notes: Notes) -> Result<Option<Crew>> {
+        if self.workers.is_none() && self.listen.is_none() {
+            return Ok(None);
+        }
+        let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let threads = rayon::current_num_threads();
+        let limits = Limits::default().with_lease(self.lease);
+        let door = Door::open(self.listen.unwrap_or(here), &self.access, limits, threads)?;
+        if self.listen.is_some() {
+            notes.say("workers", &format!("may join at {}", door.address()));
+        }
+        let start = |workers| {
+            let threads = threads as u32;
+            let share = Share {
+                workers,
+                threads,
+                memory_GiB,
+            };
+            LocalWorkers::start(&door, share)
+        };
+        let _local = self.workers.map(start).transpose()?;
+        Ok(Some(Crew { door, _local }))
+    }
+}
+
+fn lease(text: &str) -> Result<Duration, String> {
+    let seconds = text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s));
+    let seconds = seconds.ok_or_else(|| "expected seconds, 0.1 to 86400".to_owned())?;
+    Ok(Duration::from_secs_f64(seconds))
+}
