@@ -11,6 +11,7 @@ mod service;
 mod solving;
 
 use std::collections::HashMap;
+use std::fmt;
 use std::hash::{BuildHasher, RandomState};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
@@ -119,6 +120,12 @@ pub struct ClusterStatus {
     pub segments: u64,
     /// See `segments`.
     pub rays: u64,
+}
+
+impl fmt::Debug for Cluster {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Cluster").field(&self.status()).finish()
+    }
 }
 
 impl Cluster {
