@@ -9,7 +9,7 @@ use nestrad_tests::processes::{Master, nestrad, said, signal, until, wait_for};
 use tonic::Code;
 
 /// Takes some minutes to solve.
-const LONG: [&str; 5] = ["solve", "maize/scene.toml", "--accuracy", "0.05", "--out"];
+const LONG: [&str; 5] = ["solve", "maize/scene.toml", "--accuracy", "0.1", "--out"];
 
 fn state_of(master: &Master, k: usize) -> Option<v1::SolveState> {
     let solves = block_on(async {

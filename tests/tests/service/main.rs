@@ -11,5 +11,6 @@ mod clients;
 mod garbage;
 mod limits;
 mod many_solves;
+mod python;
 mod results;
 mod stopping;
