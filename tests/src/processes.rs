@@ -17,12 +17,28 @@ pub fn program(name: &str) -> PathBuf {
     let folder = BUILT.get_or_init(|| {
         // without cargo, the programs are those that lie beside the tests
         if let Some(cargo) = std::env::var_os("CARGO") {
-            let build = ["build", "--workspace", "--bins", "--profile", "test"];
-            let manifest = concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml");
-            let built = Command::new(cargo)
-                .args(build)
-                .args(["--quiet", "--manifest-path", manifest])
-                .status();
+            let mut build = Command::new(cargo);
+            build
+                .args([
+                    "build",
+                    "--workspace",
+                    "--bins",
+                    "--profile",
+                    "test",
+                    "--quiet",
+                ])
+                .args([
+                    "--manifest-path",
+                    concat!(env!("CARGO_MANIFEST_DIR"), "/../Cargo.toml"),
+                ]);
+            // what cargo says of this package would make it build others anew
+            for (name, _) in std::env::vars_os() {
+                let text = name.to_string_lossy();
+                if text.starts_with("CARGO_PKG_") || text.starts_with("CARGO_MANIFEST_") {
+                    build.env_remove(&name);
+                }
+            }
+            let built = build.status();
             assert!(built.unwrap().success());
         }
         let tests = std::env::current_exe().unwrap();
