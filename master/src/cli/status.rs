@@ -15,6 +15,9 @@ use super::console;
 /// A master answers within this.
 const ANSWER: Duration = Duration::from_secs(15);
 
+/// Solves that have ended and are shown: the last ones.
+const MOST_ENDED: usize = 10;
+
 /// Say what a master is doing: its workers, solves, jobs and rates
 #[derive(Debug, Args)]
 pub(crate) struct StatusArgs {
@@ -96,8 +99,24 @@ fn text(status: &v1::StatusResponse) -> String {
     if let Some(eta_s) = status.eta_s {
         line("left", time(eta_s));
     }
+    let ended = |solve: &&v1::SolveInfo| {
+        !matches!(
+            solve.state(),
+            v1::SolveState::Queued | v1::SolveState::Running
+        )
+    };
+    let not_shown = status.solves.iter().filter(ended).count();
+    let not_shown = not_shown.saturating_sub(MOST_ENDED);
+    if not_shown > 0 {
+        line("solves", format!("{not_shown} that have ended, and these:"));
+    }
+    let mut left_out = 0;
     for solve in &status.solves {
-        line("solve", self::solve(solve));
+        if ended(&solve) && left_out < not_shown {
+            left_out += 1;
+        } else {
+            line("solve", self::solve(solve));
+        }
     }
     text
 }
@@ -178,5 +197,29 @@ mod tests {
             assert!(text.contains(part), "{part}: {text}");
         }
         assert!(!text.contains('\u{1b}'));
+    }
+
+    #[test]
+    fn of_many_solves_that_have_ended_the_last_are_shown() {
+        let solve = |id: usize, state: v1::SolveState| v1::SolveInfo {
+            solve_id: format!("id{id:03}"),
+            state: state.into(),
+            ..v1::SolveInfo::default()
+        };
+        let mut solves = vec![solve(0, v1::SolveState::Running)];
+        solves.extend((1..=30).map(|id| solve(id, v1::SolveState::Finished)));
+        let text = text(&v1::StatusResponse {
+            solves,
+            ..v1::StatusResponse::default()
+        });
+        assert!(text.contains("20 that have ended, and these:"), "{text}");
+        for (id, shown) in [
+            ("id000", true),
+            ("id020", false),
+            ("id021", true),
+            ("id030", true),
+        ] {
+            assert_eq!(text.contains(id), shown, "{id}: {text}");
+        }
     }
 }

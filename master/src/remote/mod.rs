@@ -2,7 +2,7 @@
 //! the same to the last bit as if they were computed here.
 //!
 //! A master that is lost is looked for again; one that has forgotten scene or solve (it was started
-//! anew, or had no room) gets them once more.
+//! anew, or had no room) gets them once more. Both end after a time, or after a few rounds.
 
 mod results;
 mod upload;
@@ -36,8 +36,9 @@ const PAUSE: Duration = Duration::from_millis(500);
 /// An answer that comes at once, but for the network, comes within this.
 const ANSWER: Duration = Duration::from_secs(60);
 
-/// A master that forgets so often will not remember the next time.
-const MOST_RESTARTS: u32 = 8;
+/// A master that took the scene, or was about to give the results, so often and then failed will fail
+/// the next time.
+const MOST_ROUNDS: u32 = 8;
 
 /// A master.
 pub type Client = SolveServiceClient<Authorized>;
@@ -115,6 +116,7 @@ pub async fn solve(
         geometry_id: None,
         solve_id: None,
         heard: None,
+        rounds: 0,
     };
     tokio::select! {
         outcome = session.solve(&mut tell) => outcome,
@@ -152,6 +154,8 @@ struct Session {
     solve_id: Option<String>,
     /// When the master last answered.
     heard: Option<Instant>,
+    /// How often it took the scene, or was about to give the results.
+    rounds: u32,
 }
 
 /// Why a try came to nothing.
@@ -159,7 +163,7 @@ enum Setback {
     /// The master is away: try again.
     Away(Status),
     /// The master does not know what it was asked for: tell it again.
-    Forgotten,
+    Forgotten(Status),
     /// Trying again is of no use.
     Final(RemoteError),
 }
@@ -172,37 +176,28 @@ impl From<RemoteError> for Setback {
 
 impl Session {
     async fn solve(&mut self, tell: &mut impl FnMut(Event)) -> Result<Remote, RemoteError> {
-        let mut restarts = 0;
-        let mut away_since: Option<Instant> = None;
         let begun = Instant::now();
+        let mut told = false;
         loop {
-            let message = match self.attempt(tell).await {
+            let status = match self.attempt(tell).await {
                 Ok(remote) => return Ok(remote),
                 Err(Setback::Final(error)) => return Err(error),
-                Err(Setback::Forgotten) => {
-                    restarts += 1;
-                    if restarts > MOST_RESTARTS {
-                        let reason = "the master forgets it before it ends".to_owned();
-                        return Err(RemoteError::Failed { reason });
-                    }
-                    tell(Event::Note(
-                        "the master does not know the solve: again".to_owned(),
-                    ));
+                Err(Setback::Forgotten(status)) => {
                     self.solve_id = None;
-                    away_since = None;
-                    continue;
+                    status
                 }
-                Err(Setback::Away(status)) => status.message().to_owned(),
+                Err(Setback::Away(status)) => status,
             };
+            let message = status.message().to_owned();
             let (since, patience) = match self.heard {
                 Some(heard) => (heard, PATIENCE),
                 None => (begun, FIRST_PATIENCE),
             };
-            if since.elapsed() > patience {
+            if since.elapsed() > patience || self.rounds > MOST_ROUNDS {
                 return Err(RemoteError::Lost { message });
             }
-            if away_since.is_none_or(|away| away < since) {
-                away_since = Some(Instant::now());
+            if !told {
+                told = true;
                 tell(Event::Note(format!(
                     "the master is away ({message}): trying again"
                 )));
@@ -216,11 +211,13 @@ impl Session {
             Some(id) => id.clone(),
             None => {
                 let scene_id = self.upload().await?;
+                self.rounds += 1;
                 let id = self.start(scene_id).await?;
                 self.solve_id.insert(id).clone()
             }
         };
         self.watch(&solve_id, tell).await?;
+        self.rounds += 1;
         self.fetch(&solve_id).await
     }
 
@@ -244,7 +241,7 @@ impl Session {
             }
             Err(status) => {
                 let setback = self.setback("take the scene", status);
-                if matches!(setback, Setback::Forgotten) {
+                if matches!(setback, Setback::Forgotten(_)) {
                     self.geometry_id = None;
                 }
                 Err(setback)
@@ -357,7 +354,7 @@ impl Session {
             }
             Code::NotFound => {
                 self.heard = Some(Instant::now());
-                Setback::Forgotten
+                Setback::Forgotten(status)
             }
             _ => Setback::Final(RemoteError::Refused {
                 doing,

@@ -2,12 +2,11 @@
 
 use std::pin::Pin;
 use std::sync::Arc;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 use nestrad_proto::v1;
 use nestrad_proto::v1::solve_service_server::SolveService;
-use tokio::sync::mpsc;
+use tokio::sync::{Semaphore, mpsc};
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_stream::{Stream, StreamExt};
@@ -26,6 +25,9 @@ use super::solves::{Job, Solves, State, stopping};
 /// A client that sends nothing for so long in the middle of a scene is given up.
 const SILENCE: Duration = Duration::from_secs(60);
 
+/// Scenes that are taken in at a time: each may hold a message or two that is not checked yet.
+pub(super) const UPLOADS: usize = 16;
+
 /// Watchers are told so often at most.
 const TELL_EVERY: Duration = Duration::from_millis(200);
 
@@ -35,6 +37,8 @@ pub(super) struct Rpc {
     pub(super) scenes: Arc<Scenes>,
     pub(super) solves: Arc<Solves>,
     pub(super) metrics: Arc<Metrics>,
+    /// Permits for [`UPLOADS`].
+    pub(super) uploads: Semaphore,
     pub(super) most_GiB: f64,
     pub(super) started: Instant,
 }
@@ -50,6 +54,12 @@ impl SolveService for Rpc {
         if self.solves.is_stopping() {
             return Err(stopping().into());
         }
+        let full = |_| {
+            let message = "too many uploads at a time: try again";
+            ServiceError::new(ErrorCode::Exhausted, message)
+        };
+        let waited = timeout(SILENCE, self.uploads.acquire()).await;
+        let _permit = waited.map_err(full)?;
         let mut slices = request.into_inner();
         let Some(Part::Header(header)) = next(&mut slices).await? else {
             let message = "the first slice: expected a header, found something else";
@@ -136,8 +146,12 @@ impl SolveService for Rpc {
         };
         let table = v1::ResultTable::try_from(table).unwrap_or_default();
         let slices = slices::of(outcome, table)?;
-        job.fetched.store(true, Ordering::Relaxed);
-        Ok(Response::new(Box::pin(tokio_stream::iter(slices.map(Ok)))))
+        job.is_fetched();
+        let slices = slices.map(move |slice| {
+            job.is_fetched();
+            Ok(slice)
+        });
+        Ok(Response::new(Box::pin(tokio_stream::iter(slices))))
     }
 
     async fn cancel_solve(

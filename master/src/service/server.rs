@@ -13,6 +13,7 @@ use nestrad_proto::{DESCRIPTORS, MAX_MESSAGE_BYTES};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use thiserror::Error;
 use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 use tonic_health::server::HealthReporter;
 
@@ -20,7 +21,7 @@ use super::Limits;
 use super::compute;
 use super::connection::incoming;
 use super::metrics::{Metrics, Now};
-use super::rpc::Rpc;
+use super::rpc::{Rpc, UPLOADS};
 use super::scenes::Scenes;
 use super::solves::{Solves, State};
 
@@ -97,6 +98,7 @@ impl Service {
             scenes: self.scenes.clone(),
             solves: self.solves.clone(),
             metrics: self.metrics.clone(),
+            uploads: Semaphore::new(UPLOADS),
             most_GiB: self.limits.solve_GiB,
             started: self.started,
         };
@@ -156,7 +158,8 @@ impl Service {
             }
         }
         // results that nobody comes for are lost
-        let _ = timeout(FAREWELL, until(|| self.solves.is_quiet())).await;
+        let quiet = until(|| self.solves.is_quiet(FAREWELL));
+        let _ = timeout(limit + FAREWELL, quiet).await;
     }
 
     fn metrics_text(&self) -> String {

@@ -2,7 +2,6 @@
 //! others. Of bounded number and size; of what has ended, the oldest goes first.
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
 
@@ -21,6 +20,9 @@ const MAX_ENDED: usize = 256;
 
 /// Nobody has come for a result after this.
 const KEPT: Duration = Duration::from_secs(24 * 3600);
+
+/// A client that fetches one table after the other pauses no longer.
+const BETWEEN_TABLES: Duration = Duration::from_secs(1);
 
 /// Where a solve is.
 #[derive(Clone, Debug)]
@@ -70,8 +72,8 @@ pub(super) struct Job {
     plan: Mutex<Vec<String>>,
     queued: Instant,
     times: Mutex<Times>,
-    /// Somebody has come for its results.
-    pub(super) fetched: AtomicBool,
+    /// When somebody last took something of its results.
+    fetched: Mutex<Option<Instant>>,
 }
 
 #[derive(Clone, Copy, Debug, Default)]
@@ -107,6 +109,21 @@ impl Job {
         lock(&self.times).ended = Some(Instant::now());
         lock(&self.scene).take();
         self.state.send_replace(state);
+    }
+
+    /// Somebody takes something of its results.
+    pub(super) fn is_fetched(&self) {
+        *lock(&self.fetched) = Some(Instant::now());
+    }
+
+    /// Nobody is about to come for its results, or for more of them, as far as one can tell who
+    /// has waited for so long since it ended.
+    fn is_left(&self, wait: Duration) -> bool {
+        let ended = lock(&self.times).ended;
+        ended.is_some_and(|at| match *lock(&self.fetched) {
+            Some(fetched) => fetched.elapsed() > BETWEEN_TABLES,
+            None => at.elapsed() > wait || !matches!(self.state(), State::Finished(_)),
+        })
     }
 
     /// As a list shows it.
@@ -196,7 +213,7 @@ impl Solves {
             plan: Mutex::default(),
             queued: Instant::now(),
             times: Mutex::default(),
-            fetched: AtomicBool::new(false),
+            fetched: Mutex::default(),
         });
         known.jobs.push_back(job.clone());
         self.forget(&mut known);
@@ -287,12 +304,9 @@ impl Solves {
         self.lock().jobs.iter().map(|job| job.state().bytes()).sum()
     }
 
-    /// Every solve has ended, and somebody has come for its results.
-    pub(super) fn is_quiet(&self) -> bool {
-        self.lock().jobs.iter().all(|job| match job.state() {
-            State::Finished(_) => job.fetched.load(Ordering::Relaxed),
-            state => state.has_ended(),
-        })
+    /// Every solve has ended, and whoever wanted its results has them, or did not come within that time.
+    pub(super) fn is_quiet(&self, wait: Duration) -> bool {
+        self.lock().jobs.iter().all(|job| job.is_left(wait))
     }
 
     /// Every solve has ended.
