@@ -13,12 +13,15 @@
 
 pub mod calls;
 pub mod canopies;
+pub mod crew;
 pub mod desk;
 pub mod enclosure;
 pub mod files;
 pub mod form_factor;
 pub mod processes;
+pub mod proxy;
 pub mod reference;
+pub mod rogue;
 pub mod scenery;
 pub mod solving;
 pub mod statistics;

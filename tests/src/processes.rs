@@ -207,7 +207,7 @@ impl Drop for Master {
 }
 
 /// Keeps what a process says, and hands it on line by line.
-fn follow(stderr: impl Read + Send + 'static) -> (Arc<Mutex<String>>, Receiver<String>) {
+pub(crate) fn follow(stderr: impl Read + Send + 'static) -> (Arc<Mutex<String>>, Receiver<String>) {
     let log = Arc::new(Mutex::new(String::new()));
     let (sender, lines) = mpsc::channel();
     let kept = log.clone();

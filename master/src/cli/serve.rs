@@ -1,9 +1,11 @@
 //! `nestrad serve`: the master as a service.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args;
+use nestrad_master::cluster;
 use nestrad_master::service::{Limits, Service, serve_metrics};
 use nestrad_proto::access::Access;
 use tokio::net::TcpListener;
@@ -11,6 +13,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
 use super::flags::positive;
+use super::workers::lease;
 
 /// Serve solves to clients over gRPC, until told to stop
 ///
@@ -25,6 +28,10 @@ pub(crate) struct ServeArgs {
 
     #[command(flatten)]
     access: Access,
+
+    /// A worker that is silent for so long loses its jobs to others, seconds
+    #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
+    lease: Duration,
 
     #[command(flatten)]
     limits: LimitFlags,
@@ -117,7 +124,8 @@ impl ServeArgs {
                 _ = interrupt.recv() => {}
             }
         };
-        let service = Service::new(self.limits.limits(), self.limits.threads.into())?;
+        let workers = cluster::Limits::default().with_lease(self.lease);
+        let service = Service::new(self.limits.limits(), workers, self.limits.threads.into())?;
         let listener = bind(self.listen).await?;
         if let Some(address) = self.metrics {
             let listener = bind(address).await?;

@@ -74,7 +74,8 @@ impl WorkersFlags {
     }
 }
 
-fn lease(text: &str) -> Result<Duration, String> {
+/// A lease time.
+pub(super) fn lease(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s));
     let seconds = seconds.ok_or_else(|| "expected seconds, 0.1 to 86400".to_owned())?;
     Ok(Duration::from_secs_f64(seconds))

@@ -111,7 +111,7 @@ impl Drop for Door {
     fn drop(&mut self) {
         self.cluster.drain();
         let begun = Instant::now();
-        while self.cluster.lock().scheduler.facts().next().is_some() && begun.elapsed() < FAREWELL {
+        while self.cluster.has_workers() && begun.elapsed() < FAREWELL {
             std::thread::sleep(PAUSE);
         }
         drop(self.close.take());

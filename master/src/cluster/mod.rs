@@ -81,7 +81,10 @@ struct Shared {
 struct State {
     scheduler: Scheduler,
     solves: HashMap<Id, Open>,
+    /// Workers are told to leave.
     draining: bool,
+    /// Workers are told to come back later.
+    closed: bool,
     /// Why nothing can be computed any more.
     failed: Option<String>,
 }
@@ -122,6 +125,16 @@ pub struct ClusterStatus {
     pub rays: u64,
 }
 
+impl ClusterStatus {
+    /// Seconds until all jobs are done, going by what those that are done took; `None` without jobs or
+    /// workers.
+    pub fn eta_s(&self) -> Option<f64> {
+        let threads: u32 = self.workers.iter().map(|w| w.facts.threads).sum();
+        let known = threads > 0 && self.jobs.waiting + self.jobs.leased > 0;
+        known.then(|| self.left_s / f64::from(threads))
+    }
+}
+
 impl fmt::Debug for Cluster {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.debug_tuple("Cluster").field(&self.status()).finish()
@@ -141,6 +154,7 @@ impl Cluster {
                 scheduler: Scheduler::new(limits.rules, first_id),
                 solves: HashMap::new(),
                 draining: false,
+                closed: false,
                 failed: None,
             }),
             changed: Notify::new(),
@@ -165,9 +179,20 @@ impl Cluster {
         self.0.changed.notify_waiters();
     }
 
+    /// Gives out no more jobs: workers that ask are to ask again later, when there may be another master.
+    pub fn close(&self) {
+        self.lock().closed = true;
+        self.0.changed.notify_waiters();
+    }
+
     /// Ends all solves, now and later: there will be no workers.
     pub fn fail(&self, reason: &str) {
         self.lock().failed = Some(reason.to_owned());
+    }
+
+    /// Whether anybody is there to compute.
+    pub fn has_workers(&self) -> bool {
+        self.lock().scheduler.facts().next().is_some()
     }
 
     /// How it stands.

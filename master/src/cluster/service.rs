@@ -210,6 +210,9 @@ impl Cluster {
     ) -> Result<Option<lease_response::Answer>, Status> {
         let now = self.now();
         let mut state = self.lock();
+        if state.closed {
+            return Err(Status::unavailable("the master stops"));
+        }
         if state.draining {
             return Ok(Some(lease_response::Answer::Drain(Drain {})));
         }

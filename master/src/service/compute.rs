@@ -11,19 +11,22 @@ use super::metrics::Metrics;
 use super::outcome::Outcome;
 use super::scenes::HeldScene;
 use super::solves::{Job, Solves, State};
+use crate::cluster::Cluster;
 use crate::output::progress::Cancelled;
 use crate::output::resources::Stopwatch;
 use crate::plan::{Plan, PlanError};
-use crate::run::{self, RunError};
+use crate::run::{self, Means, RunError};
 
 /// Solves what is in the queue, one solve after the other, until the master stops.
-pub(super) fn work(solves: &Solves, pool: &ThreadPool, metrics: &Metrics) {
+pub(super) fn work(solves: &Solves, pool: &ThreadPool, workers: &Cluster, metrics: &Metrics) {
     while let Some(job) = solves.next() {
         let span = tracing::info_span!("solve", id = %job.id);
         let _entered = span.enter();
         tracing::info!(triangles = job.triangles, bands = job.bands, "begins");
         // a fault of the program ends the solve, not the master
-        let solved = catch_unwind(AssertUnwindSafe(|| pool.install(|| solve(&job, metrics))));
+        let solved = catch_unwind(AssertUnwindSafe(|| {
+            pool.install(|| solve(&job, workers, metrics))
+        }));
         let state = solved.unwrap_or_else(|_| State::Failed("internal fault".to_owned()));
         let state = match state {
             State::Failed(_) if job.progress.check().is_err() => State::Cancelled,
@@ -41,11 +44,11 @@ pub(super) fn work(solves: &Solves, pool: &ThreadPool, metrics: &Metrics) {
     }
 }
 
-fn solve(job: &Job, metrics: &Metrics) -> State {
+fn solve(job: &Job, workers: &Cluster, metrics: &Metrics) -> State {
     let Some(scene) = job.take_scene() else {
         return State::Cancelled;
     };
-    match outcome(job, &scene) {
+    match outcome(job, workers, &scene) {
         Ok(outcome) => {
             metrics.solved(&outcome.summary);
             State::Finished(Arc::new(outcome))
@@ -79,7 +82,7 @@ fn chain(error: &dyn Error) -> String {
     text
 }
 
-fn outcome(job: &Job, scene: &HeldScene) -> Result<Outcome, Fault> {
+fn outcome(job: &Job, workers: &Cluster, scene: &HeldScene) -> Result<Outcome, Fault> {
     let mut watch = Stopwatch::start();
     job.progress.stage("plan", 0);
     let problem = scene.problem();
@@ -87,7 +90,11 @@ fn outcome(job: &Job, scene: &HeldScene) -> Result<Outcome, Fault> {
     job.set_plan(&plan.reasons);
     watch.lap("plan");
     job.progress.check()?;
-    let finished = run::solve(&problem, &plan, &job.progress, &mut watch)?;
+    // a master without workers computes by itself
+    let means = Means {
+        workers: workers.has_workers().then_some(workers),
+    };
+    let finished = run::solve_with(&problem, &plan, means, &job.progress, &mut watch)?;
     let usage = watch.usage();
     Ok(Outcome::new(scene, &plan, finished, watch.stages(), usage)?)
 }

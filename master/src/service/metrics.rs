@@ -1,7 +1,7 @@
 //! What operators watch: counters that go up as things happen, gauges that are read when asked for.
 
 use std::collections::VecDeque;
-use std::sync::atomic::{AtomicI64, AtomicU64};
+use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
@@ -14,6 +14,7 @@ use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 
 use super::solves::State;
+use crate::cluster::ClusterStatus;
 
 /// Rates are means over this time.
 const RATE_OVER: Duration = Duration::from_secs(60);
@@ -40,12 +41,20 @@ struct Held {
     scenes: Gauge,
     scene_bytes: Gauge,
     result_bytes: Gauge,
+    workers: Gauge,
+    worker_threads: Gauge,
+    jobs: Family<OfState, Gauge>,
+    worker_results: Counter,
+    worker_results_refused: Counter,
+    leases_lost: Counter,
+    row_bytes: Counter,
+    block_bytes: Counter,
     memory_bytes: Gauge,
     open_files: Gauge<i64, AtomicI64>,
 }
 
 /// What is held at a moment.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct Now {
     pub(super) queued: usize,
     pub(super) running: usize,
@@ -53,6 +62,7 @@ pub(super) struct Now {
     pub(super) scenes: usize,
     pub(super) scene_bytes: u64,
     pub(super) result_bytes: u64,
+    pub(super) workers: ClusterStatus,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -145,6 +155,46 @@ impl Metrics {
             held.result_bytes.clone(),
         );
         registry.register(
+            "workers",
+            "Workers that are connected",
+            held.workers.clone(),
+        );
+        registry.register(
+            "worker_threads",
+            "Jobs that all workers compute at a time",
+            held.worker_threads.clone(),
+        );
+        registry.register(
+            "jobs",
+            "Near-field jobs of running solves",
+            held.jobs.clone(),
+        );
+        registry.register(
+            "worker_results",
+            "Results of workers that were used",
+            held.worker_results.clone(),
+        );
+        registry.register(
+            "worker_results_refused",
+            "Results of workers that were refused",
+            held.worker_results_refused.clone(),
+        );
+        registry.register(
+            "leases_lost",
+            "Jobs that workers lost or failed",
+            held.leases_lost.clone(),
+        );
+        registry.register(
+            "row_bytes",
+            "Packed rows that came from workers",
+            held.row_bytes.clone(),
+        );
+        registry.register(
+            "block_bytes",
+            "Blocks that were sent to workers",
+            held.block_bytes.clone(),
+        );
+        registry.register(
             "resident_memory_bytes",
             "Resident memory of the master",
             held.memory_bytes.clone(),
@@ -206,7 +256,7 @@ impl Metrics {
     }
 
     /// All of it as Prometheus reads it.
-    pub(super) fn text(&self, now: Now) -> String {
+    pub(super) fn text(&self, now: &Now) -> String {
         let held = &self.held;
         for (state, count) in [
             ("queued", now.queued),
@@ -219,12 +269,38 @@ impl Metrics {
         held.scenes.set(now.scenes as i64);
         held.scene_bytes.set(now.scene_bytes as i64);
         held.result_bytes.set(now.result_bytes as i64);
+        held.cluster(&now.workers);
         held.memory_bytes.set(resident_bytes().unwrap_or(0));
         held.open_files.set(open_files().unwrap_or(0));
         let mut text = String::new();
         // writing to a string does not fail
         let _ = encode(&mut text, &self.registry);
         text
+    }
+}
+
+impl Held {
+    fn cluster(&self, now: &ClusterStatus) {
+        self.workers.set(now.workers.len() as i64);
+        let threads: i64 = now.workers.iter().map(|w| i64::from(w.facts.threads)).sum();
+        self.worker_threads.set(threads);
+        for (state, count) in [
+            ("waiting", now.jobs.waiting),
+            ("leased", now.jobs.leased),
+            ("done", now.jobs.done),
+        ] {
+            let gauge = self.jobs.get_or_create(&OfState { state });
+            gauge.set(count as i64);
+        }
+        for (counter, total) in [
+            (&self.worker_results, now.results),
+            (&self.worker_results_refused, now.refused),
+            (&self.leases_lost, now.lost),
+            (&self.row_bytes, now.bytes_in),
+            (&self.block_bytes, now.bytes_out),
+        ] {
+            counter.inner().store(total, Ordering::Relaxed);
+        }
     }
 }
 
@@ -261,7 +337,7 @@ mod tests {
             ..v1::SolveSummary::default()
         });
         metrics.ended(&State::Cancelled);
-        let text = metrics.text(Now {
+        let text = metrics.text(&Now {
             queued: 3,
             ..Now::default()
         });

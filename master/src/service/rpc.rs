@@ -21,6 +21,8 @@ use super::metrics::Metrics;
 use super::scenes::{HeldGeometry, Scenes};
 use super::slices;
 use super::solves::{Job, Solves, State, stopping};
+use crate::cluster::Cluster;
+use crate::cluster::scheduler::WorkerCounts;
 
 /// A client that sends nothing for so long in the middle of a scene is given up.
 const SILENCE: Duration = Duration::from_secs(60);
@@ -39,6 +41,7 @@ pub(super) struct Rpc {
     pub(super) metrics: Arc<Metrics>,
     /// Permits for [`UPLOADS`].
     pub(super) uploads: Semaphore,
+    pub(super) workers: Cluster,
     pub(super) most_GiB: f64,
     pub(super) started: Instant,
 }
@@ -182,22 +185,35 @@ impl SolveService for Rpc {
         _: Request<v1::StatusRequest>,
     ) -> Result<Response<v1::StatusResponse>, Status> {
         let (segments_per_s, rays_per_s) = self.metrics.rates();
+        let cluster = self.workers.status();
         let solves = self.solves.all();
         Ok(Response::new(v1::StatusResponse {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: self.started.elapsed().as_secs_f64(),
-            workers: Vec::new(),
-            jobs_waiting: 0,
-            jobs_leased: 0,
-            jobs_done: 0,
+            workers: cluster.workers.iter().map(worker_info).collect(),
+            jobs_waiting: cluster.jobs.waiting as u64,
+            jobs_leased: cluster.jobs.leased as u64,
+            jobs_done: cluster.jobs.done as u64,
             solves: solves.iter().map(|job| job.info()).collect(),
             segments_per_s,
             rays_per_s,
-            eta_s: None,
+            eta_s: cluster.eta_s(),
             scenes: self.scenes.count() as u64,
             scene_bytes: self.scenes.bytes(),
             result_bytes: self.solves.result_bytes(),
         }))
+    }
+}
+
+fn worker_info(worker: &WorkerCounts) -> v1::WorkerInfo {
+    v1::WorkerInfo {
+        name: worker.facts.name.clone(),
+        threads: worker.facts.threads,
+        memory_gi_b: worker.facts.memory_bytes as f64 / (1u64 << 30) as f64,
+        leased: worker.leased as u32,
+        done: worker.done,
+        lost: worker.lost,
+        silent_s: worker.silent.as_secs_f64(),
     }
 }
 

@@ -24,6 +24,7 @@ use super::metrics::{Metrics, Now};
 use super::rpc::{Rpc, UPLOADS};
 use super::scenes::Scenes;
 use super::solves::{Solves, State};
+use crate::cluster::{self, Cluster};
 
 /// Time for clients to come for what has just finished, and to hang up, when the master stops.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -36,6 +37,7 @@ pub struct Service {
     solves: Arc<Solves>,
     metrics: Arc<Metrics>,
     pool: Arc<ThreadPool>,
+    workers: Cluster,
     started: Instant,
 }
 
@@ -60,8 +62,13 @@ pub enum ServeError {
 }
 
 impl Service {
-    /// A master that computes with so many threads, 0 for one per processor.
-    pub fn new(limits: Limits, threads: usize) -> Result<Self, ServeError> {
+    /// A master that computes with so many threads, 0 for one per processor, as long as there are no
+    /// workers. To be called within a tokio runtime.
+    pub fn new(
+        limits: Limits,
+        workers: cluster::Limits,
+        threads: usize,
+    ) -> Result<Self, ServeError> {
         let named = |k| format!("compute-{k}");
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -73,6 +80,7 @@ impl Service {
             solves: Arc::new(Solves::new(limits.queue, limits.result_bytes)),
             metrics: Arc::default(),
             pool: Arc::new(pool),
+            workers: Cluster::start(workers, threads)?,
             started: Instant::now(),
         })
     }
@@ -99,6 +107,7 @@ impl Service {
             solves: self.solves.clone(),
             metrics: self.metrics.clone(),
             uploads: Semaphore::new(UPLOADS),
+            workers: self.workers.clone(),
             most_GiB: self.limits.solve_GiB,
             started: self.started,
         };
@@ -117,6 +126,7 @@ impl Service {
             .add_service(reflection().build_v1()?)
             .add_service(reflection().build_v1alpha()?)
             .add_service(clients)
+            .add_service(self.workers.service())
             .serve_with_incoming_shutdown(incoming(listener, self.metrics.clone()), drain);
         // who does not hang up is left behind
         let patience = async {
@@ -135,7 +145,9 @@ impl Service {
             let this = self.clone();
             std::thread::Builder::new()
                 .name(format!("solve-{k}"))
-                .spawn(move || compute::work(&this.solves, &this.pool, &this.metrics))?;
+                .spawn(move || {
+                    compute::work(&this.solves, &this.pool, &this.workers, &this.metrics)
+                })?;
         }
         Ok(())
     }
@@ -157,6 +169,7 @@ impl Service {
                 self.solves.cancel(&job);
             }
         }
+        self.workers.close();
         // results that nobody comes for are lost
         let quiet = until(|| self.solves.is_quiet(FAREWELL));
         let _ = timeout(limit + FAREWELL, quiet).await;
@@ -165,13 +178,14 @@ impl Service {
     fn metrics_text(&self) -> String {
         let jobs = self.solves.all();
         let count = |of: fn(&State) -> bool| jobs.iter().filter(|job| of(&job.state())).count();
-        self.metrics.text(Now {
+        self.metrics.text(&Now {
             queued: count(|state| matches!(state, State::Queued)),
             running: count(|state| matches!(state, State::Running)),
             ended: count(State::has_ended),
             scenes: self.scenes.count(),
             scene_bytes: self.scenes.bytes(),
             result_bytes: self.solves.result_bytes(),
+            workers: self.workers.status(),
         })
     }
 }

@@ -1,0 +1,165 @@
+//! A worker whose every call a test decides on.
+
+use std::net::SocketAddr;
+
+use nestrad_proto::packed;
+use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
+use nestrad_proto::v1::{
+    self, FetchBlockRequest, GiveBackRequest, JoinRequest, LeaseRequest, LeasedJob, RenewRequest,
+    ReturnRowsRequest, RowsHeader, fetch_block_response, lease_response, return_rows_request,
+};
+use prost::Message;
+use tokio::runtime::{Builder, Runtime};
+use tonic::Status;
+use tonic::transport::{Channel, Endpoint};
+
+use crate::processes::PATIENCE;
+
+/// A worker that has joined.
+pub struct Rogue {
+    runtime: Runtime,
+    client: WorkerServiceClient<Channel>,
+    /// Its number.
+    pub id: u64,
+}
+
+/// A request to join that a master takes.
+pub fn honest_join() -> JoinRequest {
+    JoinRequest {
+        name: "rogue".to_owned(),
+        threads: 4,
+        memory_bytes: 1 << 33,
+        kernel: nestrad_worker::kernel().to_owned(),
+    }
+}
+
+impl Rogue {
+    /// Joins a master.
+    pub fn join(master: SocketAddr) -> Self {
+        Self::join_as(master, honest_join()).unwrap()
+    }
+
+    /// Joins a master, or is turned away.
+    pub fn join_as(master: SocketAddr, request: JoinRequest) -> Result<Self, Status> {
+        let runtime = Builder::new_multi_thread()
+            .worker_threads(1)
+            .enable_all()
+            .build()
+            .unwrap();
+        let url = format!("http://{master}");
+        let endpoint = Endpoint::try_from(url).unwrap();
+        let channel = runtime.block_on(endpoint.connect()).unwrap();
+        let mut client = WorkerServiceClient::new(channel);
+        let joined = runtime.block_on(client.join(request))?;
+        let id = joined.into_inner().worker_id;
+        Ok(Self {
+            runtime,
+            client,
+            id,
+        })
+    }
+
+    fn call<T>(&self, call: impl Future<Output = Result<T, Status>>) -> Result<T, Status> {
+        let bounded = async { tokio::time::timeout(PATIENCE, call).await };
+        self.runtime.block_on(bounded).expect("an answer in time")
+    }
+
+    /// Gets a job.
+    pub fn lease(&self) -> LeasedJob {
+        loop {
+            let request = LeaseRequest {
+                worker_id: self.id,
+                wait_s: 10.0,
+                held_blocks: Vec::new(),
+            };
+            let answer = self.call(self.client.clone().lease(request)).unwrap();
+            match answer.into_inner().answer {
+                Some(lease_response::Answer::Job(job)) => return job,
+                Some(lease_response::Answer::Nothing(_)) => {}
+                other => panic!("{other:?}"),
+            }
+        }
+    }
+
+    /// Computes a job, as it should.
+    pub fn compute(&self, job: &LeasedJob) -> (RowsHeader, Vec<u8>) {
+        let request = FetchBlockRequest {
+            worker_id: self.id,
+            block_id: job.block_id.clone(),
+        };
+        let bytes = self.call(async {
+            let mut stream = self.client.clone().fetch_block(request).await?.into_inner();
+            let mut bytes = Vec::new();
+            while let Some(message) = stream.message().await? {
+                match message.part.unwrap() {
+                    fetch_block_response::Part::TotalBytes(n) => assert_eq!(n, job.block_bytes),
+                    fetch_block_response::Part::Chunk(chunk) => {
+                        assert!(chunk.len() <= 1 << 20);
+                        bytes.extend_from_slice(&chunk);
+                    }
+                }
+            }
+            Ok(bytes)
+        });
+        let message = v1::Block::decode(&bytes.unwrap()[..]).unwrap();
+        let block = nestrad_worker::Block::new(&message).unwrap();
+        let tracer = nestrad_worker::Tracer::new(&block);
+        let rows = nestrad_worker::trace(&block, &tracer, job.batch.as_ref().unwrap());
+        let end_bytes = packed::end_bytes(block.ends());
+        let packed = packed::pack(&rows, end_bytes);
+        let header = RowsHeader {
+            worker_id: self.id,
+            lease_id: job.lease_id,
+            packed_bytes: packed.len() as u64,
+            checksum: blake3::hash(&packed).as_bytes().to_vec(),
+            rows: rows.lengths.len() as u32,
+            entries: rows.ends.len() as u64,
+            end_bytes: end_bytes as u32,
+            lines: rows.lines,
+            segments: rows.segments,
+            rays: rows.rays,
+            compute_s: 0.1,
+        };
+        (header, packed)
+    }
+
+    /// Returns a result; whether it was of use.
+    pub fn bring(&self, header: &RowsHeader, packed: &[u8]) -> Result<bool, Status> {
+        let mut parts = vec![return_rows_request::Part::Header(header.clone())];
+        for chunk in packed.chunks(1 << 19) {
+            parts.push(return_rows_request::Part::Chunk(chunk.to_vec().into()));
+        }
+        self.send(parts)
+    }
+
+    /// Sends any messages as a result.
+    pub fn send(&self, parts: Vec<return_rows_request::Part>) -> Result<bool, Status> {
+        let messages = parts
+            .into_iter()
+            .map(|part| ReturnRowsRequest { part: Some(part) });
+        let stream = tokio_stream::iter(messages.collect::<Vec<_>>());
+        let answer = self.call(self.client.clone().return_rows(stream))?;
+        Ok(answer.into_inner().used)
+    }
+
+    /// A heartbeat; gives the leases that are not wanted.
+    pub fn renew(&self, lease_ids: Vec<u64>) -> Result<Vec<u64>, Status> {
+        let request = RenewRequest {
+            worker_id: self.id,
+            lease_ids,
+        };
+        let answer = self.call(self.client.clone().renew(request))?;
+        Ok(answer.into_inner().unwanted_lease_ids)
+    }
+
+    /// Gives a job back as failed.
+    pub fn fail(&self, job: &LeasedJob, reason: &str) {
+        let request = GiveBackRequest {
+            worker_id: self.id,
+            lease_id: job.lease_id,
+            reason: reason.to_owned(),
+            failed: true,
+        };
+        self.call(self.client.clone().give_back(request)).unwrap();
+    }
+}
