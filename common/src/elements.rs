@@ -43,6 +43,12 @@ impl Elements {
         elements
     }
 
+    /// How many there would be.
+    pub fn count(scene: &Scene, max_edge_m: f64) -> u64 {
+        let pieces = |t: &[DVec3; 3]| u64::from(divisions(t, max_edge_m)).pow(2);
+        scene.triangles.iter().map(pieces).sum()
+    }
+
     /// Number of elements.
     pub fn len(&self) -> usize {
         self.area_m2.len()
@@ -63,15 +69,22 @@ impl Elements {
     }
 }
 
-fn divisions([a, b, c]: &[DVec3; 3], max_edge_m: f64) -> u32 {
+fn divisions(triangle: &[DVec3; 3], max_edge_m: f64) -> u32 {
+    let [a, b, c] = triangle;
     let longest = a.distance(*b).max(b.distance(*c)).max(c.distance(*a));
-    let n = (longest / max_edge_m).ceil();
+    // pieces are as slender as the triangle, so a slender one would have far more than its area needs
+    let by_area = (MOST_PIECES * geometry::area(triangle)).sqrt() / max_edge_m;
+    let n = (longest / max_edge_m).min(by_area).ceil();
     if n.is_finite() {
         (n as u32).clamp(1, MAX_DIVISIONS)
     } else {
         1
     }
 }
+
+/// Most pieces of a triangle in an area of the square of the longest edge: those of a triangle of which
+/// one edge is 16 times as long as the height over it.
+const MOST_PIECES: f64 = 32.0;
 
 /// The piece, `0..n*n`, that holds the point with barycentric coordinates `b1`, `b2` of the second
 /// and third vertex, when each edge is cut into `n`.
@@ -136,6 +149,21 @@ mod tests {
             ] {
                 assert!(piece(n, b1, b2) < n * n);
             }
+        }
+    }
+
+    #[test]
+    fn a_needle_is_not_cut_into_thousands() {
+        let needle = |width: f64| Scene {
+            triangles: vec![[DVec3::ZERO, DVec3::X, DVec3::Y * width]],
+            ..Scene::default()
+        };
+        // as ever up to a slenderness of 16
+        assert_eq!(Elements::divide(&needle(1.0 / 15.0), 0.01).len(), 101 * 101);
+        for (width, most) in [(1e-3, 200), (1e-6, 1), (0.0, 1)] {
+            let elements = Elements::divide(&needle(width), 0.01);
+            assert!(elements.len() <= most, "{width}: {}", elements.len());
+            assert_eq!(Elements::count(&needle(width), 0.01), elements.len() as u64);
         }
     }
 

@@ -19,3 +19,18 @@ pub fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Option<(DVec3,
         Some((lo, hi)) => Some((lo.min(p), hi.max(p))),
     })
 }
+
+/// The point of the part of a triangle with these corners (barycentric coordinates of its second and
+/// third vertex) that two numbers in [0, 1) stand for; uniform numbers give uniform points.
+pub fn point_within(
+    [a, b, c]: &[DVec3; 3],
+    corners: &[(f64, f64); 3],
+    [r1, r2]: [f64; 2],
+) -> DVec3 {
+    // square-root map of the unit square to a triangle (Turk 1990)
+    let (w1, w2) = (r1.sqrt() * (1.0 - r2), r1.sqrt() * r2);
+    let w0 = 1.0 - w1 - w2;
+    let b1 = w0 * corners[0].0 + w1 * corners[1].0 + w2 * corners[2].0;
+    let b2 = w0 * corners[0].1 + w1 * corners[1].1 + w2 * corners[2].1;
+    *a + b1 * (*b - *a) + b2 * (*c - *a)
+}

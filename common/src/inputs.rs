@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use thiserror::Error;
 
 use crate::formats::Place;
+use crate::formats::light::is_irradiance;
 use crate::light::Sky;
 use crate::optics::LeafOptics;
 use crate::options::{Options, Unit};
@@ -103,7 +104,7 @@ impl LightInput {
             return Ok(());
         };
         for (band, &found) in irradiance_W_m2 {
-            if !(found.is_finite() && found >= 0.0) {
+            if !is_irradiance(found) {
                 let band = band.clone();
                 return Err(LightFault::Irradiance { band, found });
             }
@@ -139,7 +140,7 @@ impl LightInput {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum LightFault {
     /// Less than no light, or no number.
-    #[error("irradiance in band {band}: expected a finite number of at least 0, found {found}")]
+    #[error("irradiance in band {band}: expected 0 or 1e-100 to 1e100, found {found:e}")]
     Irradiance {
         /// The band's name.
         band: String,

@@ -154,7 +154,8 @@ impl Parts<'_> {
         let [up, scattered_down] = self.solved(b).map_or([0.0; 2], |k| self.escaped_W(band, k));
         let down = scattered_down + self.direct.passed_W[b];
         let incoming = self.direct.incoming_W[b] + self.outer_soil_W(b);
-        let variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
+        let mut variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
+        variance[4] += self.direct.closure_variance_W2[b];
         let estimate = |value: f64, k: usize| Estimate {
             value,
             se: variance[k].sqrt(),

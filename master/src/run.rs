@@ -174,7 +174,8 @@ impl Meanwhile {
         };
         stage("direct light");
         let areas_m2 = plan.direct_line_areas_m2(problem);
-        let direct = direct_light(problem, world, &areas_m2, plan.seed);
+        let direct =
+            direct_light(problem, world, &areas_m2, plan.seed).map_err(ExchangeError::from)?;
         watch.lap("direct light");
         progress.check()?;
         let (mut far, mut fixed_W_m2) = (None, Vec::new());

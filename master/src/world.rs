@@ -47,6 +47,22 @@ pub struct SoilGrid {
 }
 
 impl SoilGrid {
+    /// Cells of about `cell_m` under all of an extent.
+    pub fn over(extent: &Extent, z_m: f64, cell_m: f64) -> Self {
+        let min_m = extent.min_m.truncate();
+        let size = extent.max_m.truncate() - min_m;
+        let n = (size / cell_m)
+            .round()
+            .clamp(DVec2::ONE, DVec2::splat(f64::from(MOST_CELLS)));
+        Self {
+            z_m,
+            min_m,
+            cell_m: (size / n).max(DVec2::splat(f64::MIN_POSITIVE)),
+            nx: n.x as u32,
+            ny: n.y as u32,
+        }
+    }
+
     /// Area of a cell, m².
     pub fn cell_area_m2(&self) -> f64 {
         self.cell_m.x * self.cell_m.y
@@ -82,37 +98,10 @@ impl World {
         radius_m: f64,
         far: (u32, u32),
     ) -> Self {
-        let (mut min, mut max) = geometry::bounds(scene.triangles.iter().flatten())
-            .unwrap_or((DVec3::ZERO, DVec3::ZERO));
-        if let Some(z) = scene.soil_z_m {
-            (min.z, max.z) = (min.z.min(z), max.z.max(z));
-        }
-        match scene.pattern {
-            Some(p) => {
-                (min.x, min.y) = p.min_m.into();
-                (max.x, max.y) = (p.min_m + p.size_m).into();
-            }
-            // The soil of an open scene is mapped as far from the plants as these are high; beyond,
-            // it is taken as unshaded.
-            None if scene.soil_z_m.is_some() => {
-                let margin = DVec2::splat(max.z - min.z).extend(0.0);
-                (min, max) = (min - margin, max + margin);
-            }
-            None => {}
-        }
-        let soil = scene.soil_z_m.map(|z_m| {
-            let size = max.truncate() - min.truncate();
-            let n = (size / soil_cell_m)
-                .round()
-                .clamp(DVec2::ONE, DVec2::splat(f64::from(MOST_CELLS)));
-            SoilGrid {
-                z_m,
-                min_m: min.truncate(),
-                cell_m: (size / n).max(DVec2::splat(f64::MIN_POSITIVE)),
-                nx: n.x as u32,
-                ny: n.y as u32,
-            }
-        });
+        let extent = extent_of(scene);
+        let soil = scene
+            .soil_z_m
+            .map(|z_m| SoilGrid::over(&extent, z_m, soil_cell_m));
         let elements = Elements::divide(scene, max_edge_m);
         let ends = Ends {
             elements: elements.len() as u32,
@@ -129,11 +118,7 @@ impl World {
                 .map(|&m| matches!(scene.materials[m as usize], Material::Stem { .. }))
                 .collect(),
             triangle_of_element: elements.triangle_of_element(),
-            extent: Extent {
-                min_m: min,
-                max_m: max,
-                periodic: scene.pattern.is_some(),
-            },
+            extent,
             elements,
             ends,
             soil,
@@ -158,6 +143,33 @@ impl World {
     /// Number of rows: faces and soil cells.
     pub fn rows(&self) -> usize {
         self.ends.rows() as usize
+    }
+}
+
+/// Where the lines of a scene run.
+pub fn extent_of(scene: &Scene) -> Extent {
+    let (mut min, mut max) =
+        geometry::bounds(scene.triangles.iter().flatten()).unwrap_or((DVec3::ZERO, DVec3::ZERO));
+    if let Some(z) = scene.soil_z_m {
+        (min.z, max.z) = (min.z.min(z), max.z.max(z));
+    }
+    match scene.pattern {
+        Some(p) => {
+            (min.x, min.y) = p.min_m.into();
+            (max.x, max.y) = (p.min_m + p.size_m).into();
+        }
+        // The soil of an open scene is mapped as far from the plants as these are high; beyond,
+        // it is taken as unshaded.
+        None if scene.soil_z_m.is_some() => {
+            let margin = DVec2::splat(max.z - min.z).extend(0.0);
+            (min, max) = (min - margin, max + margin);
+        }
+        None => {}
+    }
+    Extent {
+        min_m: min,
+        max_m: max,
+        periodic: scene.pattern.is_some(),
     }
 }
 

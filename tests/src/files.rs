@@ -31,6 +31,11 @@ pub struct Written<'a> {
 impl Written<'_> {
     /// Writes the files to a folder and loads them.
     pub fn load(&self, folder: &Path) -> Problem {
+        load(&self.inputs(folder)).unwrap().problem
+    }
+
+    /// Writes the files to a folder.
+    pub fn inputs(&self, folder: &Path) -> Inputs {
         let scale = match self.unit {
             Unit::Metre => 1.0,
             Unit::Centimetre => 100.0,
@@ -59,7 +64,7 @@ impl Written<'_> {
         let corners = |[x0, y0, x1, y1]: [f64; 4]| {
             PatternInput::Corners([x0 + m.x, y0 + m.y, x1 + m.x, y1 + m.y].map(|c| c * scale))
         };
-        let inputs = Inputs {
+        Inputs {
             scenes: vec![file("scene.can", &can)],
             unit: Some(self.unit),
             pattern: self.pattern_m.map(corners),
@@ -67,7 +72,6 @@ impl Written<'_> {
             bands: self.optics.iter().enumerate().map(band).collect(),
             light: Some(LightInput::File(file("sun.light", self.light))),
             ..Inputs::default()
-        };
-        load(&inputs).unwrap().problem
+        }
     }
 }

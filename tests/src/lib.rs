@@ -11,11 +11,13 @@
     reason = "this crate is used by tests only, where a panic is a failure"
 )]
 
+pub mod adding;
 pub mod calls;
 pub mod canopies;
 pub mod crew;
 pub mod desk;
 pub mod enclosure;
+pub mod extremes;
 pub mod files;
 pub mod form_factor;
 pub mod processes;

@@ -18,7 +18,7 @@ fn absorbed(problem: &Problem, pitch_m: f64) -> Vec<(f64, f64)> {
     let areas = vec![pitch_m * pitch_m; problem.sources.len()];
     let runs: Vec<Vec<f64>> = (1..=16)
         .map(|seed| {
-            let direct = direct_light(problem, &world, &areas, seed);
+            let direct = direct_light(problem, &world, &areas, seed).unwrap();
             let mut organs = vec![0.0; problem.scene.organs.len()];
             for (e, &t) in world.triangle_of_element.iter().enumerate() {
                 // black on both faces

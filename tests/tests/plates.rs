@@ -2,10 +2,8 @@
 
 #![allow(clippy::unwrap_used)]
 
-use glam::DVec2;
 use nestrad_common::optics::{FaceOptics, LeafOptics};
-use nestrad_tests::enclosure::full_plate;
-use nestrad_tests::scenery::{Scenery, from_zenith};
+use nestrad_tests::adding::{plates, stack};
 use nestrad_tests::solving::{ESTIMATORS, by, finish, plan, shares};
 use nestrad_tests::statistics::assert_within;
 
@@ -13,56 +11,8 @@ use nestrad_tests::statistics::assert_within;
 /// sampling error.
 const STOPPED: f64 = 4e-4;
 
-/// Adding of layers (Stokes 1862): from the soil up, `albedo` of what lies below a plate, and per
-/// plate the irradiance of both its faces, from the top down, for unit irradiance.
-struct Stack {
-    albedo: f64,
-    upper: Vec<f64>,
-    lower: Vec<f64>,
-    soil: f64,
-}
-
-fn stack(n: usize, leaf: LeafOptics, soil_albedo: f64) -> Stack {
-    let (upper, lower) = (leaf.upper, leaf.lower);
-    // albedo under plate k, counted from the bottom
-    let mut under = vec![soil_albedo];
-    for k in 0..n {
-        let r = under[k];
-        under.push(upper.rho + upper.tau * r * lower.tau / (1.0 - lower.rho * r));
-    }
-    let mut down = 1.0;
-    let (mut e_upper, mut e_lower) = (Vec::new(), Vec::new());
-    for k in (0..n).rev() {
-        // light between this plate and what is below goes to and fro
-        let below = down * upper.tau / (1.0 - lower.rho * under[k]);
-        e_upper.push(down);
-        e_lower.push(below * under[k]);
-        down = below;
-    }
-    Stack {
-        albedo: under[n],
-        upper: e_upper,
-        lower: e_lower,
-        soil: down,
-    }
-}
-
-/// Plates a decimetre apart, each moved past the edges of the pattern by its own bit.
-fn scenery(n: usize, leaf: LeafOptics, soil_albedo: f64) -> Scenery {
-    let mut scenery = Scenery::periodic(DVec2::new(0.6, 0.4)).soil(0.0);
-    for k in 0..n {
-        let z = 0.1 * (n - k) as f64;
-        let offset = DVec2::new(0.07, -0.05) * k as f64;
-        full_plate(&mut scenery, &format!("leaf {k}"), z, offset);
-    }
-    scenery.band("B", soil_albedo, &[("leaf", leaf)]);
-    scenery.source(from_zenith(0.0, 0.0), 60.0);
-    scenery.source(from_zenith(50.0, 30.0), 40.0);
-    scenery
-}
-
 fn check(n: usize, leaf: LeafOptics, soil_albedo: f64) -> f64 {
-    let scenery = scenery(n, leaf, soil_albedo);
+    let scenery = plates(n, 0.1, leaf, soil_albedo);
     let expected = stack(n, leaf, soil_albedo);
     let mut albedo = 0.0;
     for estimator in ESTIMATORS {

@@ -9,6 +9,11 @@ use super::lines::{Fields, Lines};
 /// at a given irradiance of the horizontal their beams would be without bounds.
 pub const MIN_DESCENT: f64 = 1e-4;
 
+/// Whether an irradiance can be computed with: 0, or large and small enough for its square to be a number.
+pub fn is_irradiance(value_W_m2: f64) -> bool {
+    value_W_m2 == 0.0 || (1e-100..=1e100).contains(&value_W_m2)
+}
+
 /// A parallel source in one band, or in all bands alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LightSource {
@@ -39,9 +44,13 @@ fn source(fields: &mut Fields<'_>) -> Result<LightSource, FormatError> {
         found,
     };
     let irradiance_W_m2 = fields.number("an irradiance")?;
-    if irradiance_W_m2 < 0.0 {
-        let found = irradiance_W_m2.to_string();
-        return Err(fault(fields, "an irradiance of at least 0", found));
+    if !is_irradiance(irradiance_W_m2) {
+        let found = format!("{irradiance_W_m2:e}");
+        return Err(fault(
+            fields,
+            "an irradiance of 0 or 1e-100 to 1e100",
+            found,
+        ));
     }
     let given = DVec3::new(
         fields.number("x of the direction of travel")?,
@@ -114,7 +123,7 @@ mod tests {
             ),
             (
                 "-1 0 0 -1",
-                "a.light, line 1: expected an irradiance of at least 0, found -1",
+                "a.light, line 1: expected an irradiance of 0 or 1e-100 to 1e100, found -1e0",
             ),
             (
                 "nan 0 0 -1",

@@ -2,18 +2,23 @@
 //! is on top keeps the light (DESIGN: sections 2 and 4).
 //!
 //! An organ gets the light of the lattice points that it shows, which sums to the incoming light
-//! exactly. Within an organ, light is dealt out by how much of each element is seen (visible points
+//! exactly (an organ that is met by a few points only is probed with rays instead). Within an organ, light is dealt out by how much of each element is seen (visible points
 //! over all of its points), so a fully lit leaf is evenly lit however few points its elements have.
 
 mod buffer;
+mod outlines;
+mod probe;
 mod source;
 
 use nestrad_common::directions::{Purpose, stream};
+use nestrad_common::light::Source;
 use nestrad_common::problem::Problem;
+use nestrad_worker::BlockFault;
 use rand::RngExt;
 use rayon::prelude::*;
 
 use crate::world::World;
+use probe::Probe;
 
 /// Uncollided light on everything that has a row.
 #[derive(Clone, Debug, Default)]
@@ -26,6 +31,8 @@ pub struct Direct {
     pub element_variance_W2: Vec<f64>,
     /// Light that comes in, W per band: on the pattern, or on all that an open scene intercepts.
     pub incoming_W: Vec<f64>,
+    /// Variance of how much of the light that comes in is not accounted for, W² per band.
+    pub closure_variance_W2: Vec<f64>,
     /// Light that passes an open pattern without soil, W per band.
     pub passed_W: Vec<f64>,
     /// Lattice points that were drawn.
@@ -37,7 +44,13 @@ pub struct Direct {
 const GROUPS: usize = 8;
 
 /// Projects every source. `line_area_m2` holds, per source, the cross-section of a line (m²).
-pub fn direct_light(problem: &Problem, world: &World, line_area_m2: &[f64], seed: u64) -> Direct {
+pub fn direct_light(
+    problem: &Problem,
+    world: &World,
+    line_area_m2: &[f64],
+    seed: u64,
+) -> Result<Direct, BlockFault> {
+    let probe = Probe::new(problem, world, line_area_m2, seed)?;
     let numbered: Vec<usize> = (0..problem.sources.len()).collect();
     let parts: Vec<Direct> = (0..GROUPS.min(numbered.len()))
         .into_par_iter()
@@ -47,12 +60,16 @@ pub fn direct_light(problem: &Problem, world: &World, line_area_m2: &[f64], seed
             for &k in numbered.iter().skip(group).step_by(GROUPS) {
                 let mut rng = stream(seed, Purpose::Direct, k as u64);
                 let random = [rng.random(), rng.random(), 0.5];
+                let drawn = source::Drawn {
+                    k,
+                    line_area_m2: line_area_m2[k],
+                    random,
+                };
                 source::add(
                     problem,
                     world,
-                    k,
-                    line_area_m2[k],
-                    random,
+                    &drawn,
+                    probe.as_ref(),
                     &mut scratch,
                     &mut part,
                 );
@@ -68,10 +85,11 @@ pub fn direct_light(problem: &Problem, world: &World, line_area_m2: &[f64], seed
         add(&mut sum.organ_variance_W2, &part.organ_variance_W2);
         add(&mut sum.element_variance_W2, &part.element_variance_W2);
         add(&mut sum.incoming_W, &part.incoming_W);
+        add(&mut sum.closure_variance_W2, &part.closure_variance_W2);
         add(&mut sum.passed_W, &part.passed_W);
         sum.lines += part.lines;
     }
-    sum
+    Ok(sum)
 }
 
 fn empty(problem: &Problem, world: &World) -> Direct {
@@ -81,6 +99,7 @@ fn empty(problem: &Problem, world: &World) -> Direct {
         organ_variance_W2: vec![0.0; problem.scene.organs.len() * bands],
         element_variance_W2: vec![0.0; world.elements.len() * bands],
         incoming_W: vec![0.0; bands],
+        closure_variance_W2: vec![0.0; bands],
         passed_W: vec![0.0; bands],
         lines: 0,
     }
@@ -92,18 +111,34 @@ fn empty(problem: &Problem, world: &World) -> Direct {
 /// The variance of an organ's light goes with `I² a^(3/2)` (I: irradiance perpendicular to the
 /// source, a: cross-section; the variance of an area measured by a lattice of points, Gundersen &
 /// Jensen 1987), the cost with `1/a`; the least variance for a given cost has `a ~ I^(-4/5)`.
-pub fn spread_effort(problem: &Problem, finest_m2: f64) -> Vec<f64> {
+pub fn spread_effort(problem: &Problem, finest_m2: f64, ground_area_m2: f64) -> Vec<f64> {
     let intensity: Vec<f64> = problem
         .sources
         .iter()
         .map(|s| s.irradiance_W_m2.iter().sum::<f64>() / -s.direction.z)
         .collect();
     let strongest = intensity.iter().copied().fold(0.0, f64::max);
-    intensity
+    let wanted: Vec<f64> = problem
+        .sources
         .iter()
-        .map(|i| finest_m2 * (i / strongest).powf(-0.8).min(COARSEST))
-        .collect()
+        .zip(&intensity)
+        .map(|(source, i)| {
+            let fewest = ground_area_m2 * -source.direction.z / FEWEST_POINTS;
+            let part = (i / strongest).powf(-0.8).min(COARSEST);
+            (finest_m2 * part).min(fewest).max(f64::MIN_POSITIVE)
+        })
+        .collect();
+    let points = |(source, area): (&Source, &f64)| ground_area_m2 * -source.direction.z / area;
+    let all: f64 = problem.sources.iter().zip(&wanted).map(points).sum();
+    let too_many = (all / MOST_POINTS).max(1.0);
+    wanted.iter().map(|area| area * too_many).collect()
 }
 
 /// No source is drawn with lines coarser than this many times those of the strongest.
 const COARSEST: f64 = 4.0;
+
+/// No source is drawn with fewer points on the ground than this, however low it stands.
+const FEWEST_POINTS: f64 = 1e3;
+
+/// All sources together are not drawn with more points than this: a quarter of an hour or so.
+const MOST_POINTS: f64 = 3e10;

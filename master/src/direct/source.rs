@@ -9,12 +9,9 @@ use nestrad_common::problem::Problem;
 
 use super::Direct;
 use super::buffer::{Buffer, Top};
+use super::outlines::Outlines;
+use super::probe::{Probe, Thin};
 use crate::world::World;
-
-/// Variance of an area that is measured by counting points of a square lattice of spacing h:
-/// `0.0724 h³ P`, P the length of its outline (Gundersen & Jensen 1987, after Matérn); and a lattice
-/// counts `4/pi P/h` neighbours across an outline of any direction.
-const VARIANCE_PER_CROSSING: f64 = 0.0724 * std::f64::consts::FRAC_PI_4;
 
 /// Counters, kept from source to source.
 pub(super) struct Scratch {
@@ -34,6 +31,8 @@ struct OfOrgan {
     seen_m2: f64,
     /// By what its elements got.
     dealt_m2: f64,
+    /// Points that meet it, seen or not.
+    met: u32,
 }
 
 /// An element that is lit.
@@ -57,22 +56,37 @@ impl Scratch {
     }
 
     fn clear(&mut self) {
+        self.lit.clear();
         self.visible.fill(0);
         self.met.fill(0);
         self.organ.fill(OfOrgan::default());
     }
 }
 
-/// Adds the light of source `k` to `direct`.
+/// How a source is drawn.
+pub(super) struct Drawn {
+    /// Its number.
+    pub(super) k: usize,
+    /// Cross-section of a line, m².
+    pub(super) line_area_m2: f64,
+    /// See [`Lattice::new`].
+    pub(super) random: [f64; 3],
+}
+
+/// Adds the light of a source to `direct`.
 pub(super) fn add(
     problem: &Problem,
     world: &World,
-    k: usize,
-    line_area_m2: f64,
-    random: [f64; 3],
+    drawn: &Drawn,
+    probe: Option<&Probe>,
     scratch: &mut Scratch,
     direct: &mut Direct,
 ) {
+    let &Drawn {
+        k,
+        line_area_m2,
+        random,
+    } = drawn;
     let source = &problem.sources[k];
     let bands = problem.bands.len();
     let towards = -source.direction;
@@ -85,14 +99,12 @@ pub(super) fn add(
         .collect();
     let mut missed = 0u64;
     scratch.clear();
-    let crossings = Crossings {
-        problem,
-        world,
-        scale: intensity
-            .iter()
-            .map(|i| VARIANCE_PER_CROSSING * (i * lattice.line_area_m2).powi(2))
-            .collect(),
-    };
+    let mut thin = Thin::of(problem, towards, line_area_m2);
+    if probe.is_none() {
+        thin.forget();
+    }
+    let point_W: Vec<f64> = intensity.iter().map(|i| i * lattice.line_area_m2).collect();
+    let mut outlines = Outlines::new(problem, world, &thin.organ, lattice.nx, &point_W);
     let Scratch {
         buffer,
         visible,
@@ -122,16 +134,18 @@ pub(super) fn add(
                         },
                     }
                     // neighbours to the right and above, within the strip
+                    let (at, variance) = ([i, j as usize], &mut direct.organ_variance_W2);
                     if i + 1 < nx {
-                        crossings.count(top, buffer.top(point + 1), &mut direct.organ_variance_W2);
+                        outlines.beside(top, buffer.top(point + 1), at, variance);
                     }
                     if r + 1 < rows.len() {
-                        crossings.count(top, buffer.top(point + nx), &mut direct.organ_variance_W2);
+                        outlines.above(top, buffer.top(point + nx), at, variance);
                     }
                 }
             }
         },
     );
+    outlines.finish(&mut direct.organ_variance_W2);
 
     direct.lines += lattice.lines() as u64;
     for (b, i) in intensity.iter().enumerate() {
@@ -141,15 +155,18 @@ pub(super) fn add(
             direct.passed_W[b] += i * lattice.line_area_m2 * missed as f64;
         }
     }
-    deal_out(
+    let beam = Beam {
         problem,
         world,
+        k,
         towards,
-        lattice.line_area_m2,
-        &intensity,
-        scratch,
-        direct,
-    );
+        line_area_m2: lattice.line_area_m2,
+        intensity: &intensity,
+    };
+    if let Some(probe) = probe.filter(|_| thin.any()) {
+        beam.probe(probe, &thin, scratch, direct);
+    }
+    beam.deal_out(&thin, scratch, direct);
     if let Some(soil) = &world.soil {
         for cell in 0..soil.cells() {
             let row = world.ends.soil(cell) as usize;
@@ -164,65 +181,175 @@ pub(super) fn add(
 /// Points that a large element is met by, on average.
 const LARGE: f64 = 4.0;
 
-/// Deals the light of each organ out to its elements.
-///
-/// A large element is lit by its projected area times the part of its points that see the source, a
-/// small one by the area of the points that see it. Which of the two depends on its size alone, so both
-/// are unbiased. What all of an organ's elements get is then scaled to what the organ gets.
-fn deal_out(
-    problem: &Problem,
-    world: &World,
+/// A source, and what it is drawn with.
+struct Beam<'a> {
+    problem: &'a Problem,
+    world: &'a World,
+    /// Number of the source.
+    k: usize,
     towards: DVec3,
     line_area_m2: f64,
-    intensity: &[f64],
-    scratch: &mut Scratch,
-    direct: &mut Direct,
-) {
-    let (scene, bands) = (&problem.scene, problem.bands.len());
-    let organ_of = |t: u32| scene.organ[t as usize] as usize;
-    scratch.lit.clear();
-    for (e, &t) in world.triangle_of_element.iter().enumerate() {
-        let seen = f64::from(scratch.visible[2 * e] + scratch.visible[2 * e + 1]);
-        if seen == 0.0 {
-            continue;
-        }
-        let met = f64::from(scratch.met[e]);
-        let projected_m2 = projected_area_m2(world, &scene.triangles, e, towards);
-        let (area_m2, variance_m4) = if projected_m2.abs() > LARGE * line_area_m2 {
-            let part = seen / met;
-            // binomial, for the points that meet it
-            (
-                projected_m2.abs() * part,
-                projected_m2 * projected_m2 * part * (1.0 - part) / met,
-            )
-        } else {
-            (seen * line_area_m2, seen * line_area_m2 * line_area_m2)
-        };
-        let organ = &mut scratch.organ[organ_of(t)];
-        organ.seen_m2 += seen * line_area_m2;
-        organ.dealt_m2 += area_m2;
-        scratch.lit.push(Lit {
-            element: e,
-            upper: projected_m2 > 0.0,
-            area_m2,
-            variance_m4,
-        });
+    /// Perpendicular to the source, W m⁻², per band.
+    intensity: &'a [f64],
+}
+
+impl Beam<'_> {
+    fn organ_of(&self, t: u32) -> usize {
+        self.problem.scene.organ[t as usize] as usize
     }
-    for lit in &scratch.lit {
-        let t = world.triangle_of_element[lit.element];
-        let organ = &scratch.organ[organ_of(t)];
-        let row = 2 * lit.element + usize::from(!lit.upper);
-        let irradiated =
-            lit.area_m2 * organ.seen_m2 / organ.dealt_m2 / world.elements.area_m2[lit.element];
-        for (b, i) in intensity.iter().enumerate() {
-            direct.irradiance_W_m2[row * bands + b] += i * irradiated;
-            let absorbed = i * absorptance(
-                &problem.bands[b],
-                scene.material[t as usize] as usize,
-                lit.upper,
-            );
-            direct.element_variance_W2[lit.element * bands + b] +=
+
+    fn projected_m2(&self, element: usize) -> f64 {
+        projected_area_m2(
+            self.world,
+            &self.problem.scene.triangles,
+            element,
+            self.towards,
+        )
+    }
+
+    /// Lights the organs that are too small for the lattice by rays; what points show of them is
+    /// forgotten.
+    fn probe(&self, probe: &Probe, thin: &Thin, scratch: &mut Scratch, direct: &mut Direct) {
+        let world = self.world;
+        let mut rays_of_organ = vec![[0.0; 2]; thin.organ.len()];
+        let first = scratch.lit.len();
+        let (mut shown_m2, mut projected_m2) = (0.0, 0.0);
+        for (e, &t) in world.triangle_of_element.iter().enumerate() {
+            let o = self.organ_of(t);
+            let projected = self.projected_m2(e);
+            if !thin.organ[o] {
+                continue;
+            }
+            let points = scratch.visible[2 * e] + scratch.visible[2 * e + 1];
+            shown_m2 += f64::from(points) * self.line_area_m2;
+            projected_m2 += projected.abs();
+            if projected == 0.0 {
+                continue;
+            }
+            let rays = Probe::rays_of(projected.abs() / thin.projected_m2[o]);
+            let free = probe.lit(world, e, (self.k, self.towards), rays);
+            rays_of_organ[o][0] += f64::from(free);
+            rays_of_organ[o][1] += f64::from(rays);
+            scratch.lit.push(Lit {
+                element: e,
+                upper: projected > 0.0,
+                area_m2: projected.abs() * f64::from(free) / f64::from(rays),
+                // of one ray; what is free of all of the organ is known only below
+                variance_m4: projected * projected / f64::from(rays),
+            });
+        }
+        let mut lit_m2 = 0.0;
+        for lit in &mut scratch.lit[first..] {
+            let o = self.organ_of(world.triangle_of_element[lit.element]);
+            // a few rays that all say the same are no certainty (Jeffreys)
+            let [free, rays] = rays_of_organ[o];
+            let part = (free + 0.5) / (rays + 1.0);
+            lit.variance_m4 *= part * (1.0 - part);
+            lit_m2 += lit.area_m2;
+            let organ = &mut scratch.organ[o];
+            organ.seen_m2 += lit.area_m2;
+            organ.dealt_m2 += lit.area_m2;
+        }
+        for (b, i) in self.intensity.iter().enumerate() {
+            if world.extent.periodic {
+                direct.closure_variance_W2[b] += i * i * projected_m2 * self.line_area_m2;
+            } else {
+                direct.incoming_W[b] += i * (lit_m2 - shown_m2);
+            }
+        }
+        for lit in &scratch.lit[first..] {
+            self.add_organ_variance(lit, &mut direct.organ_variance_W2);
+        }
+    }
+
+    fn add_organ_variance(&self, lit: &Lit, variance_W2: &mut [f64]) {
+        let t = self.world.triangle_of_element[lit.element];
+        let (bands, material) = (&self.problem.bands, self.problem.scene.material[t as usize]);
+        for (b, i) in self.intensity.iter().enumerate() {
+            let absorbed = i * absorptance(&bands[b], material as usize, lit.upper);
+            variance_W2[self.organ_of(t) * bands.len() + b] +=
                 absorbed * absorbed * lit.variance_m4;
+        }
+    }
+
+    /// Deals the light of each organ out to its elements.
+    ///
+    /// A large element is lit by its projected area times the part of its points that see the source, a
+    /// small one by the area of the points that see it. Which of the two depends on its size alone, so
+    /// both are unbiased. What all of an organ's elements get is then scaled to what the organ gets.
+    fn deal_out(&self, thin: &Thin, scratch: &mut Scratch, direct: &mut Direct) {
+        let (scene, bands) = (&self.problem.scene, self.problem.bands.len());
+        let (world, line_area_m2) = (self.world, self.line_area_m2);
+        for (e, &t) in world.triangle_of_element.iter().enumerate() {
+            scratch.organ[self.organ_of(t)].met += scratch.met[e];
+            let seen = f64::from(scratch.visible[2 * e] + scratch.visible[2 * e + 1]);
+            // rounding to the lattice may give some area to a triangle without any
+            if seen == 0.0 || thin.organ[self.organ_of(t)] || world.elements.area_m2[e] == 0.0 {
+                continue;
+            }
+            let met = f64::from(scratch.met[e]);
+            let projected_m2 = self.projected_m2(e);
+            let (area_m2, variance_m4) = if projected_m2.abs() > LARGE * line_area_m2 {
+                let part = seen / met;
+                // binomial, for the points that meet it
+                (
+                    projected_m2.abs() * part,
+                    projected_m2 * projected_m2 * part * (1.0 - part) / met,
+                )
+            } else {
+                (seen * line_area_m2, seen * line_area_m2 * line_area_m2)
+            };
+            let organ = &mut scratch.organ[self.organ_of(t)];
+            organ.seen_m2 += seen * line_area_m2;
+            organ.dealt_m2 += area_m2;
+            scratch.lit.push(Lit {
+                element: e,
+                upper: projected_m2 > 0.0,
+                area_m2,
+                variance_m4,
+            });
+        }
+        for lit in scratch.lit.iter().filter(|lit| lit.area_m2 > 0.0) {
+            let t = world.triangle_of_element[lit.element];
+            let organ = &scratch.organ[self.organ_of(t)];
+            let row = 2 * lit.element + usize::from(!lit.upper);
+            let irradiated =
+                lit.area_m2 * organ.seen_m2 / organ.dealt_m2 / world.elements.area_m2[lit.element];
+            for (b, i) in self.intensity.iter().enumerate() {
+                direct.irradiance_W_m2[row * bands + b] += i * irradiated;
+            }
+        }
+        // what no point meets gets nothing, which may be wrong by all of it
+        for (e, &t) in world.triangle_of_element.iter().enumerate() {
+            let o = self.organ_of(t);
+            let projected_m2 = self.projected_m2(e);
+            if scratch.met[e] > 0 || thin.organ[o] || projected_m2 == 0.0 {
+                continue;
+            }
+            let visible = (scratch.organ[o].seen_m2 / thin.projected_m2[o]).min(1.0);
+            let unmet = scratch.organ[o].met == 0;
+            let lit = Lit {
+                element: e,
+                upper: projected_m2 > 0.0,
+                area_m2: 0.0,
+                variance_m4: projected_m2.abs() * line_area_m2 * if unmet { 1.0 } else { visible },
+            };
+            if unmet {
+                self.add_organ_variance(&lit, &mut direct.organ_variance_W2);
+            }
+            scratch.lit.push(lit);
+        }
+        for lit in &scratch.lit {
+            let t = world.triangle_of_element[lit.element] as usize;
+            for (b, i) in self.intensity.iter().enumerate() {
+                let absorbed = i * absorptance(
+                    &self.problem.bands[b],
+                    scene.material[t] as usize,
+                    lit.upper,
+                );
+                direct.element_variance_W2[lit.element * bands + b] +=
+                    absorbed * absorbed * lit.variance_m4;
+            }
         }
     }
 }
@@ -239,7 +366,7 @@ fn projected_area_m2(
     0.5 * geometry::doubled_area_vector(&triangles[t]).dot(towards) / f64::from(n * n)
 }
 
-fn absorptance(band: &Band, material: usize, upper: bool) -> f64 {
+pub(super) fn absorptance(band: &Band, material: usize, upper: bool) -> f64 {
     let optics = &band.materials[material];
     if upper {
         optics.upper.absorptance()
@@ -252,58 +379,4 @@ fn soil_cell(world: &World, lattice: &Lattice, i: usize, j: u32) -> Option<u32> 
     let soil = world.soil.as_ref()?;
     let at = lattice.point_at(i as f64, f64::from(j), soil.z_m);
     soil.cell_at(at.truncate(), world.extent.periodic)
-}
-
-/// Counts neighbours across the outlines of organs.
-struct Crossings<'a> {
-    problem: &'a Problem,
-    world: &'a World,
-    /// Variance of one crossing of unit absorptance, W², per band.
-    scale: Vec<f64>,
-}
-
-impl Crossings<'_> {
-    fn count(&self, a: Option<Top>, b: Option<Top>, variance_W2: &mut [f64]) {
-        if a == b {
-            return;
-        }
-        let scene = &self.problem.scene;
-        let at = |top: Top| {
-            let t = self.world.triangle_of_element[top.element as usize] as usize;
-            (
-                scene.organ[t] as usize,
-                scene.material[t] as usize,
-                top.upper,
-            )
-        };
-        let (a, b) = (a.map(at), b.map(at));
-        if a == b {
-            return;
-        }
-        let bands = self.scale.len();
-        let same_organ = matches!((a, b), (Some(a), Some(b)) if a.0 == b.0);
-        for (band, scale) in self
-            .problem
-            .bands
-            .iter()
-            .enumerate()
-            .map(|(k, b)| (b, (k, self.scale[k])))
-        {
-            let (k, scale) = scale;
-            let value = |side: Option<(usize, usize, bool)>| {
-                side.map_or(0.0, |(_, m, upper)| absorptance(band, m, upper))
-            };
-            if same_organ {
-                if let Some((o, ..)) = a {
-                    variance_W2[o * bands + k] += scale * (value(a) - value(b)).powi(2);
-                }
-            } else {
-                for side in [a, b] {
-                    if let Some((o, ..)) = side {
-                        variance_W2[o * bands + k] += scale * value(side).powi(2);
-                    }
-                }
-            }
-        }
-    }
 }

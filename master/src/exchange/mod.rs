@@ -10,7 +10,9 @@ mod split;
 
 use std::ops::AddAssign;
 
+use glam::DVec3;
 use nestrad_common::directions::Axes;
+use nestrad_common::lattice::{Extent, Lattice};
 use nestrad_common::scene::Scene;
 use nestrad_proto::packed::PackedFault;
 use nestrad_proto::v1;
@@ -50,6 +52,25 @@ impl Sampling {
     pub fn lines_per_m2(&self) -> f64 {
         let directions = self.batches / 2 * self.sets_per_batch * self.axes.count();
         0.5 * f64::from(directions) / self.line_area_m2
+    }
+
+    /// Lines through an extent, in all directions together.
+    pub fn lines(&self, extent: &Extent) -> f64 {
+        let lattice = |lines: v1::Lines| {
+            let d = lines.direction.unwrap_or_default();
+            let random = [lines.random_x, lines.random_y, lines.random_count];
+            Lattice::new(
+                DVec3::new(d.x, d.y, d.z),
+                extent,
+                lines.line_area_m2,
+                random,
+            )
+            .lines()
+        };
+        (0..self.batches)
+            .flat_map(|b| batch_message(self, b).lines)
+            .map(|lines| lattice(lines) as f64)
+            .sum()
     }
 
     /// The longest line through a layer of that height, metres; infinite with rays.

@@ -1,10 +1,12 @@
 //! How much memory a plan takes.
 
+use nestrad_common::elements::Elements;
 use nestrad_common::problem::Problem;
 use serde::Serialize;
 
 use super::Plan;
 use crate::solver::HALF_BATCHES;
+use crate::world::{SoilGrid, extent_of};
 
 /// Memory of the large parts of a solve, GiB.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
@@ -22,22 +24,20 @@ impl Memory {
     pub fn of(problem: &Problem, plan: &Plan) -> Self {
         const GIB: f64 = (1u64 << 30) as f64;
         let (scale, bands) = (&plan.scale, problem.bands.len() as f64);
-        let triangles = problem.scene.triangles.len() as f64;
-        let piece_m2 = plan.max_edge_m * plan.max_edge_m * 0.5;
-        let elements = triangles + scale.area_m2 / piece_m2.max(f64::MIN_POSITIVE);
-        let cells = scale.ground_area_m2 / (plan.soil_cell_m * plan.soil_cell_m);
-        let rows = 2.0 * elements
-            + if problem.scene.soil_z_m.is_some() {
-                cells
-            } else {
-                0.0
-            };
+        let scene = &problem.scene;
+        let triangles = scene.triangles.len() as f64;
+        let elements = Elements::count(scene, plan.max_edge_m) as f64;
+        let extent = extent_of(scene);
+        let soil = scene
+            .soil_z_m
+            .map(|z_m| SoilGrid::over(&extent, z_m, plan.soil_cell_m));
+        let rows = 2.0 * elements + soil.map_or(0.0, |s| f64::from(s.cells()));
         // vertices thrice, a few numbers per element, results of triangles
-        let scene =
+        let scene_bytes =
             triangles * (3.0 * 72.0 + 40.0 * bands) + elements * 60.0 + 8.0 * rows * bands * 9.0;
         let Some(sampling) = &plan.sampling else {
             return Self {
-                scene_GiB: scene / GIB,
+                scene_GiB: scene_bytes / GIB,
                 ..Self::default()
             };
         };
@@ -45,7 +45,7 @@ impl Memory {
             f64::from(sampling.batches * sampling.sets_per_batch * sampling.axes.count());
         // each hit is seen from both sides, each line has two ends
         let hits = 0.5 * directions * scale.area_m2 / sampling.line_area_m2;
-        let lines = 0.5 * directions * scale.ground_area_m2 / sampling.line_area_m2;
+        let lines = sampling.lines(&extent);
         let rays =
             f64::from(sampling.batches) * sampling.least_samples * rows / HALF_BATCHES as f64;
         let entries = 2.0 * hits
@@ -58,7 +58,7 @@ impl Memory {
         // a batch is held twice while it is sorted
         let transient = 2.0 * 4.0 * entries / f64::from(sampling.batches);
         Self {
-            scene_GiB: scene / GIB,
+            scene_GiB: scene_bytes / GIB,
             rows_GiB: (4.0 * entries + transient + 4.0 * rows * f64::from(sampling.batches)) / GIB,
             solver_GiB: rows * (8.0 * HALF_BATCHES as f64 * 6.0 + 48.0 * bands) / GIB,
         }

@@ -1,9 +1,12 @@
 //! The plan: what a scene needs, decided before anything is computed. What is not needed costs
 //! nothing.
 
+mod limits;
 mod memory;
 mod reasons;
 mod scale;
+
+use std::fmt;
 
 use nestrad_common::directions::Axes;
 use nestrad_common::options::Diameter;
@@ -93,26 +96,85 @@ pub struct Plan {
 pub enum PlanError {
     /// It does not fit.
     #[error(
-        "the solve needs about {needed_GiB:.2} GiB, the limit is {limit_GiB} GiB: raise --memory or --accuracy"
+        "the solve needs about {:.2} GiB (scene {:.2}, rows {:.2}, solver {:.2}), the limit is {} GiB: raise --memory or --accuracy",
+        .needed.total_GiB(), .needed.scene_GiB, .needed.rows_GiB, .needed.solver_GiB, Short(*.limit_GiB)
     )]
     Memory {
         /// What the smallest plan for this accuracy takes.
-        needed_GiB: f64,
+        needed: Memory,
         /// What the user allows.
         limit_GiB: f64,
     },
+    /// More accuracy than there are directions for.
+    #[error("accuracy: expected at least {least} %, found {} %", Short(*.found))]
+    Accuracy {
+        /// The least that can be asked for.
+        least: f64,
+        /// As given.
+        found: f64,
+    },
+    /// A triangle that covers its own copies.
+    #[error(
+        "triangle {triangle} (from 0) reaches over {patterns:.1e} copies of the pattern, expected at most {most:.0e}: is the unit right?"
+    )]
+    Overhang {
+        /// Its number.
+        triangle: usize,
+        /// Copies of the pattern that it reaches into.
+        patterns: f64,
+        /// Most copies.
+        most: f64,
+    },
+    /// Leaves that cannot be told apart in height.
+    #[error(
+        "the scene, soil included, is {height_m:.3e} m high, which resolves heights to {step_m:.1e} m only, against triangles of {triangle_m:.1e} m: is the height of the soil right?"
+    )]
+    Height {
+        /// From the lowest to the highest point.
+        height_m: f64,
+        /// A step in depth along the vertical.
+        step_m: f64,
+        /// Root of the area of a triangle.
+        triangle_m: f64,
+    },
+    /// More elements than can be numbered.
+    #[error(
+        "triangles would be cut into {found} elements, expected at most {most}: raise --diameter or --accuracy"
+    )]
+    Elements {
+        /// How many there would be.
+        found: u64,
+        /// How many can be numbered.
+        most: u64,
+    },
+}
+
+/// A number without a row of zeros.
+struct Short(f64);
+
+impl fmt::Display for Short {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if (1e-3..1e6).contains(&self.0) {
+            self.0.fmt(f)
+        } else {
+            write!(f, "{:e}", self.0)
+        }
+    }
 }
 
 impl Plan {
     /// Decides what a problem needs.
     pub fn new(problem: &Problem, settings: &Settings) -> Result<Self, PlanError> {
+        limits::check_accuracy(settings)?;
+        limits::check_overhang(problem)?;
         let scale = Scale::of(problem);
+        limits::check_height(&scale)?;
         let has_soil = problem.scene.soil_z_m.is_some();
         let lit = |b: usize| problem.sources.iter().any(|s| s.irradiance_W_m2[b] > 0.0);
         let scattering_bands: Vec<usize> = (0..problem.bands.len())
             .filter(|&b| lit(b) && !problem.bands[b].is_black(has_soil))
             .collect();
-        let sampling = (!scattering_bands.is_empty()).then(|| sampling(&scale, settings));
+        let sampling = (!scattering_bands.is_empty()).then(|| sampling(problem, &scale, settings));
         // an open scene has no layers that go on for ever; its exchange is full
         let radius_m = match settings.diameter {
             Diameter::Metres(d) if problem.scene.pattern.is_some() => Some(0.5 * d),
@@ -122,22 +184,28 @@ impl Plan {
         let radius_m =
             radius_m.filter(|&r| sampling.is_some_and(|s| r < s.longest_sight_m(scale.height_m)));
         let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
-        let max_edge_m = (scale.organ_area_m2.sqrt() / 6.0)
+        let organ_m = match scale.organ_area_m2 {
+            0.0 => f64::INFINITY,
+            area => area.sqrt(),
+        };
+        let max_edge_m = (organ_m / 6.0)
             .min((scale.ground_area_m2 / 1000.0).sqrt())
             .max(f64::MIN_POSITIVE)
-            .min(radius_m.unwrap_or(f64::INFINITY))
+            .min(radius_m.map_or(f64::INFINITY, |r| r.max(organ_m / FINEST_CUT)))
             * finer.sqrt().clamp(0.2, 1.0);
-        let soil_cell_m = (0.2 * scale.organ_area_m2.sqrt()).clamp(
+        let soil_cell_m = (0.2 * organ_m).clamp(
             (scale.ground_area_m2 / MOST_SOIL_CELLS).sqrt(),
             (scale.ground_area_m2 / LEAST_SOIL_CELLS)
                 .sqrt()
                 .max(f64::MIN_POSITIVE),
         );
+        limits::check_elements(problem, max_edge_m)?;
         // points on the outline of an organ: see `spread_effort`
         let direct_line_area_m2 = (scale.organ_area_m2 / 11_000.0 * finer.powf(4.0 / 3.0))
             .min(scale.triangle_area_m2 / 4.0)
+            .min(max_edge_m * max_edge_m / EDGE_SQUARED_IN_POINTS)
             .clamp(
-                scale.ground_area_m2 / MOST_DIRECT_LINES,
+                scale.ground_area_m2 / most_points(problem, finer),
                 scale.ground_area_m2 / 1e4,
             )
             .max(f64::MIN_POSITIVE);
@@ -159,10 +227,9 @@ impl Plan {
             reasons: Vec::new(),
         };
         plan.memory = Memory::of(problem, &plan);
-        let needed_GiB = plan.memory.total_GiB();
-        if needed_GiB > settings.memory_GiB {
+        if plan.memory.total_GiB() > settings.memory_GiB {
             return Err(PlanError::Memory {
-                needed_GiB,
+                needed: plan.memory,
                 limit_GiB: settings.memory_GiB,
             });
         }
@@ -183,31 +250,52 @@ impl Plan {
 
     /// Cross-sections of the lines of each source, m².
     pub fn direct_line_areas_m2(&self, problem: &Problem) -> Vec<f64> {
-        direct::spread_effort(problem, self.direct_line_area_m2)
+        direct::spread_effort(problem, self.direct_line_area_m2, self.scale.ground_area_m2)
     }
 }
+
+/// An organ of average size is not cut finer than into this many along a side, however small the sphere.
+const FINEST_CUT: f64 = 24.0;
 
 /// Soil cells, at most and at least.
 const MOST_SOIL_CELLS: f64 = 1e6;
 const LEAST_SOIL_CELLS: f64 = 64.0;
 
-/// Lattice points of the strongest source, at most.
+/// Lattice points of the strongest source, at most: some, and what a canopy of a tenth of a square metre
+/// of leaf per square metre asks for. What is too small for them is probed with rays.
+fn most_points(problem: &Problem, finer: f64) -> f64 {
+    let scene = &problem.scene;
+    let of_organs = 11_000.0 * scene.organs.len() as f64 / finer.powf(4.0 / 3.0);
+    (1e6 + 10.0 * (of_organs + 4.0 * scene.triangles.len() as f64)).min(MOST_DIRECT_LINES)
+}
+
+/// Never more than this.
 const MOST_DIRECT_LINES: f64 = 3e8;
+
+/// An element of full size is met by half as many points as this, so that it is lit as it should be.
+const EDGE_SQUARED_IN_POINTS: f64 = 32.0;
+
+/// Lines of a direction, at most: some, and what the leaves of a canopy of a tenth of a square metre of
+/// leaf per square metre ask for. Where leaves are fewer still, most lines would meet none of them.
+const LINES_ANYWHERE: f64 = 1e5;
+const LINES_PER_ORGAN: f64 = 1500.0;
+const LINES_PER_TRIANGLE: f64 = 3.0;
 
 /// How the exchange is sampled for an accuracy.
 ///
 /// The error of an organ falls with the root of the number of directions; lines beyond some 75 per
 /// organ and direction hardly help (both measured: see `master/docs/accuracy.md`). 16 batches of 2
 /// sets of 16 axes give 0.3 to 0.45 % in NIR.
-fn sampling(scale: &Scale, settings: &Settings) -> Sampling {
+fn sampling(problem: &Problem, scale: &Scale, settings: &Settings) -> Sampling {
     let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
     let (sets_per_batch, least_samples) = match settings.estimator {
-        Estimator::Lines => (
-            (2.0 / (finer * finer)).round().clamp(1.0, 4096.0) as u32,
-            4.0,
-        ),
+        Estimator::Lines => ((2.0 / (finer * finer)).round().max(1.0) as u32, 4.0),
         Estimator::Rays => (0, (RAYS / (finer * finer)).round().clamp(8.0, 1e6)),
     };
+    let scene = &problem.scene;
+    let most_lines = LINES_ANYWHERE
+        + LINES_PER_ORGAN * scene.organs.len() as f64
+        + LINES_PER_TRIANGLE * scene.triangles.len() as f64;
     Sampling {
         batches: 2 * HALF_BATCHES as u32,
         axes: Axes::Both,
@@ -215,6 +303,7 @@ fn sampling(scale: &Scale, settings: &Settings) -> Sampling {
         line_area_m2: (scale.organ_area_m2 / 150.0)
             .min(4.5 * scale.triangle_area_m2)
             .min(scale.ground_area_m2 / 1000.0)
+            .max(scale.ground_area_m2 / most_lines)
             .max(f64::MIN_POSITIVE),
         least_samples,
         seed: settings.seed,

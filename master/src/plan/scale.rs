@@ -4,14 +4,15 @@ use nestrad_common::geometry;
 use nestrad_common::problem::Problem;
 use serde::Serialize;
 
-use crate::world::is_soil;
+use crate::world::{extent_of, is_soil};
 
 /// Lengths and areas that stand for a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Scale {
     /// One-sided area of all triangles, m².
     pub area_m2: f64,
-    /// Area of the ground: the pattern, or the box around an open scene, m².
+    /// Area that lines are spread over: of the pattern, or of an open scene's box and the soil around it
+    /// (a scene that stands on edge has the mean cross-section of its box), m².
     pub ground_area_m2: f64,
     /// From the lowest to the highest point, soil included, m.
     pub height_m: f64,
@@ -37,19 +38,17 @@ impl Scale {
                 organs[scene.organ[t] as usize] += a;
             }
         }
-        let (mut lo, mut hi) =
-            geometry::bounds(scene.triangles.iter().flatten()).unwrap_or_default();
-        if let Some(z) = scene.soil_z_m {
-            (lo.z, hi.z) = (lo.z.min(z), hi.z.max(z));
-        }
-        let size = hi - lo;
+        let extent = extent_of(scene);
+        let size = extent.max_m - extent.min_m;
+        let [x, y, z] = size.to_array();
         let mean = |squares: f64| if area > 0.0 { squares / area } else { 0.0 };
         Self {
             area_m2: area,
-            // a scene that stands on edge still has an extent
-            ground_area_m2: scene
-                .pattern
-                .map_or((size.x * size.y).max(area * 1e-3), |p| p.area_m2()),
+            ground_area_m2: match scene.pattern {
+                Some(pattern) => pattern.area_m2(),
+                // a quarter of the surface (Cauchy 1832)
+                None => (x * y).max(0.5 * (x * y + x * z + y * z)),
+            },
             height_m: size.z,
             organ_area_m2: mean(organs.iter().map(|a| a * a).sum()),
             triangle_area_m2: mean(triangle_squares),

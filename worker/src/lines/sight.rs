@@ -39,12 +39,17 @@ impl<'a> Sight<'a> {
     /// Adds the pairs along one line; `hits` by rising depth.
     pub(crate) fn along(&self, line: usize, hits: &[Hit], pairs: &mut Vec<Pair>) {
         let start = pairs.len();
-        // what lies under the soil sees nothing and is not seen
         let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
-        let hits = &hits[hits.partition_point(|h| h.depth() < soil_depth)..];
+        let (under, hits) = hits.split_at(hits.partition_point(|h| h.depth() < soil_depth));
         self.neighbours(line, hits, soil_depth, pairs);
         if hits.iter().any(|h| self.block.is_solid(h.face_along())) {
             bury(self.block, hits, self.radius, pairs, start);
+        }
+        // what lies under the soil gets no light and is not seen
+        let buried = self.block.local(self.block.ends.buried());
+        for hit in under {
+            pairs.push((hit.face_against(), buried));
+            pairs.push((hit.face_along(), buried));
         }
     }
 

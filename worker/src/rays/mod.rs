@@ -1,13 +1,17 @@
 //! Rays from the faces themselves: they complete the faces that the lines sample too thinly, and over
 //! all faces they are the independent estimator that the lines are tested against.
 
+mod boxes;
+mod meeting;
+#[cfg(test)]
+mod tests;
 mod tracer;
 
 use std::ops::Range;
 
 use glam::{DVec2, DVec3};
 use nestrad_common::directions::{Purpose, stream};
-use nestrad_common::elements;
+use nestrad_common::{elements, geometry};
 use nestrad_proto::v1;
 use rand::RngExt;
 use rand_pcg::Pcg64Mcg;
@@ -97,7 +101,8 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
             let outward = if side == 0 { normal } else { -normal };
             let corners = elements::piece_corners(n, local - block.first[t]);
             for k in 0..count {
-                let origin = point(triangle, &corners, &mut rng);
+                let random = [rng.random(), rng.random()];
+                let origin = geometry::point_within(triangle, &corners, random);
                 let direction = cosine_direction(outward, (k, count), &mut rng);
                 let ray = FaceRay {
                     face,
@@ -144,17 +149,6 @@ fn from_soil(
             looks.push((row, tracer.seen(block, &ray, rng.random())));
         }
     }
-}
-
-/// A point uniform over the piece with these barycentric corners.
-fn point(triangle: &[DVec3; 3], corners: &[(f64, f64); 3], rng: &mut Pcg64Mcg) -> DVec3 {
-    // square-root map of the unit square to a triangle (Turk 1990)
-    let (r1, r2): (f64, f64) = (rng.random(), rng.random());
-    let (w1, w2) = (r1.sqrt() * (1.0 - r2), r1.sqrt() * r2);
-    let w0 = 1.0 - w1 - w2;
-    let b1 = w0 * corners[0].0 + w1 * corners[1].0 + w2 * corners[2].0;
-    let b2 = w0 * corners[0].1 + w1 * corners[1].1 + w2 * corners[2].1;
-    triangle[0] + b1 * (triangle[1] - triangle[0]) + b2 * (triangle[2] - triangle[0])
 }
 
 /// A direction whose density is the cosine to `normal` over pi (Malley's method); the squared sines

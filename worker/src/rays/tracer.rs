@@ -5,30 +5,32 @@
 
 use std::time::Duration;
 
-use glam::{DVec2, DVec3};
+use glam::{DVec2, DVec3, Vec3A};
 use nestrad_common::{elements, geometry};
 use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
 use obvhs::cwbvh::CwBvh;
 use obvhs::cwbvh::builder::build_cwbvh;
 use obvhs::ray::{Ray, RayHit};
 
+use super::boxes::{Boxes, Shift};
+use super::meeting::Edges;
 use crate::block::Block;
 
 /// The acceleration structure of a block.
 pub struct Tracer {
     bvh: CwBvh,
-    /// Local triangle and copy of each primitive, in the order of the tree's leaves.
-    primitives: Vec<(u32, Shift)>,
+    /// Triangles of each leaf of the tree: where its list starts in `members`, and their number at the end.
+    first_member: Vec<u32>,
+    /// Local triangles and copies of them.
+    members: Vec<(u32, Shift)>,
     /// Tree units per metre: obvhs drops nodes nearer than 1e-4 of its units.
     scale: f64,
     centre: DVec3,
     z_min_m: f64,
     z_max_m: f64,
+    /// What lies closer together than this touches, metres.
+    touch_m: f64,
 }
-
-/// A copy of the scene: how many patterns it lies away in x and y.
-type Shift = [i64; 2];
 
 /// obvhs enters nodes no nearer than this, in its units.
 const NEAREST_NODE: f64 = 1e-4;
@@ -36,6 +38,15 @@ const NEAREST_NODE: f64 = 1e-4;
 /// Half the extent of the scene in tree units: large enough that `NEAREST_NODE` is below the rounding
 /// of f32 coordinates, small enough that nothing overflows.
 const HALF_EXTENT: f64 = 1e4;
+
+/// Rounding of a box and of a ray to f32, in units of the last place of the extent: half a unit for each
+/// of the ray's origin, its direction, the inverse of that, a difference and a product, over twice the
+/// half extent.
+const ROUNDINGS: f64 = 6.0;
+
+/// Two surfaces touch when they are closer than this part of the scene's extent: rounding in f64 says
+/// nothing of which is nearer. Then they lie as the lines have them, by rising number from below.
+const TOUCH: f64 = 1e-12;
 
 /// A ray that has crossed this many patterns without a hit is taken to leave the canopy sideways.
 const MOST_PATTERNS: usize = 100_000;
@@ -48,53 +59,58 @@ impl Tracer {
         let (mut lo, mut hi) =
             geometry::bounds(block.soup.triangles().iter().flatten()).unwrap_or_default();
         let (z_min_m, z_max_m) = (lo.z, hi.z);
+        // rays begin on the soil too, which may reach far beyond the leaves
+        (lo, hi) = (lo.min(extent.min_m), hi.max(extent.max_m));
         if extent.periodic {
-            (lo.x, lo.y, hi.x, hi.y) = (
-                extent.min_m.x,
-                extent.min_m.y,
-                extent.max_m.x,
-                extent.max_m.y,
-            );
+            (lo.x, lo.y) = extent.min_m.truncate().into();
+            (hi.x, hi.y) = extent.max_m.truncate().into();
         }
         let centre = 0.5 * (lo + hi);
         let scale = HALF_EXTENT / (0.5 * (hi - lo)).max_element().max(f64::MIN_POSITIVE);
-        // f32 rounding of a box and of a ray's origin, and the nodes that obvhs takes as passed
-        let padding = HALF_EXTENT * f64::from(f32::EPSILON) * 4.0 + 2.0 * NEAREST_NODE;
+        let touch_m = TOUCH * lo.abs().max(hi.abs()).max_element();
+        // and the nodes that obvhs takes as passed
+        let padding = HALF_EXTENT * f64::from(f32::EPSILON) * ROUNDINGS + 2.0 * NEAREST_NODE;
 
-        let mut primitives = Vec::with_capacity(block.soup.triangles().len());
-        let mut boxes = Vec::with_capacity(block.soup.triangles().len());
-        for (t, triangle) in block.soup.triangles().iter().enumerate() {
-            let Some((a, b)) = geometry::bounds(triangle) else {
-                continue;
-            };
-            for shift in copies(block, a.truncate(), b.truncate()) {
-                let by = block.shift_m(shift);
-                let tree = |p: DVec3| (p + by - centre) * scale;
-                boxes.push(Aabb {
-                    min: (tree(a) - padding).as_vec3a(),
-                    max: (tree(b) + padding).as_vec3a(),
-                });
-                primitives.push((t as u32, shift));
-            }
-        }
+        let tree = |p: DVec3| (p - centre) * scale;
+        let Boxes {
+            boxes,
+            first_member,
+            members,
+        } = Boxes::of(block, tree, padding);
         let bvh = build_cwbvh(
             &boxes,
             BvhBuildParams::medium_build(),
             &mut Duration::default(),
         );
-        let primitives = bvh
-            .primitive_indices
-            .iter()
-            .map(|&p| primitives[p as usize])
-            .collect();
         Self {
             bvh,
-            primitives,
+            first_member,
+            members,
             scale,
             centre,
             z_min_m,
             z_max_m,
+            touch_m,
         }
+    }
+
+    /// Whether a point of a local triangle and element sees the sky in a direction that points up. The
+    /// block is a whole scene without a far field.
+    pub fn sees_sky(
+        &self,
+        block: &Block,
+        (triangle, element): (u32, u32),
+        origin: DVec3,
+        direction: DVec3,
+    ) -> bool {
+        let normal = geometry::doubled_area_vector(&block.soup.triangles()[triangle as usize]);
+        let ray = FaceRay {
+            face: 2 * element + u32::from(normal.dot(direction) < 0.0),
+            origin,
+            direction,
+            source: Some(triangle),
+        };
+        self.seen(block, &ray, 0.0) == block.local(block.ends.sky())
     }
 
     /// The local end that a ray from triangle `source` meets first.
@@ -107,13 +123,17 @@ impl Tracer {
             dz => (z - origin.z) / dz,
         };
         let soil_t = match &block.soil {
-            // what lies under the soil sees nothing
-            Some(soil) if origin.z < soil.z_m => return block.local(block.ends.void()),
+            // what lies under the soil gets no light
+            Some(soil) if origin.z < soil.z_m - self.touch_m => {
+                return block.local(block.ends.buried());
+            }
             Some(soil) if direction.z < 0.0 => to_height(soil.z_m),
             _ => f64::INFINITY,
         };
+        // what touches the soil lies on it
+        let soil_limit = soil_t + self.touch_m / direction.z.abs();
         // past the top or bottom of the leaves there is nothing more to hit
-        let limit = soil_t.min(self.reach_m(ray)).min(block.radius_m);
+        let limit = soil_limit.min(self.reach_m(ray)).min(block.radius_m);
         match self.nearest(block, ray, limit) {
             Some((_, face)) if self.is_buried(block, ray, face) => {
                 block.local(if block.is_inside(ray.face) {
@@ -215,36 +235,91 @@ impl Tracer {
         let start = ((home + entered * ray.direction - self.centre) * self.scale).as_vec3a();
         let reach = (((limit - entered) * self.scale) as f32) * (1.0 + 1e-5) + 1.0;
         let edges = Edges::new(ray.direction);
-        let mut best: Option<(f64, u32)> = None;
-        let tree_ray = Ray::new(start, ray.direction.as_vec3a(), 0.0, reach.max(0.0));
+        let up = ray.direction.z >= 0.0;
+        let mut best: Option<Hit> = None;
+        let tree_ray = Ray::new(start, tree_direction(ray.direction), 0.0, reach.max(0.0));
         self.bvh
-            .ray_traverse(tree_ray, &mut RayHit::none(), |_, p| {
-                let (t, copy) = self.primitives[p];
-                let away = [pattern[0] + copy[0], pattern[1] + copy[1]];
-                if Some(t) == ray.source && away == [0, 0] {
-                    return f32::INFINITY;
+            .ray_traverse(tree_ray, &mut RayHit::none(), |_, leaf| {
+                let leaf = self.bvh.primitive_indices[leaf] as usize;
+                let members =
+                    self.first_member[leaf] as usize..self.first_member[leaf + 1] as usize;
+                let mut nearest = f64::INFINITY;
+                for &(t, copy) in &self.members[members] {
+                    let away = [pattern[0] + copy[0], pattern[1] + copy[1]];
+                    let place = (t, away);
+                    if Some(place) == ray.source.map(|t| (t, [0, 0])) {
+                        continue;
+                    }
+                    let triangle = &block.soup.triangles()[t as usize];
+                    let Some(mut hit) = edges.meet(triangle, ray.origin - block.shift_m(away))
+                    else {
+                        continue;
+                    };
+                    let slack = self.touch_in_t(triangle, ray.direction, hit.t);
+                    if hit.t.abs() <= slack {
+                        // it touches what the ray leaves
+                        let above = ray.source.is_none_or(|t| place > (t, [0, 0]));
+                        if above != up {
+                            continue;
+                        }
+                        hit.t = 0.0;
+                    } else if hit.t < 0.0 {
+                        continue;
+                    }
+                    let nearer = best.as_ref().is_none_or(|best| {
+                        if (hit.t - best.t).abs() <= slack {
+                            (place < best.place) == up
+                        } else {
+                            hit.t < best.t
+                        }
+                    });
+                    if hit.t > limit || !nearer {
+                        continue;
+                    }
+                    let (first, n) = (block.first[t as usize], block.divisions[t as usize]);
+                    best = Some(Hit {
+                        t: hit.t,
+                        place,
+                        face: 2 * (first + elements::piece(n, hit.b1, hit.b2))
+                            + u32::from(!hit.upper),
+                    });
+                    nearest = hit.t;
                 }
-                let Some(hit) = edges.meet(
-                    &block.soup.triangles()[t as usize],
-                    ray.origin - block.shift_m(away),
-                ) else {
-                    return f32::INFINITY;
-                };
-                let (first, n) = (block.first[t as usize], block.divisions[t as usize]);
-                let nearer =
-                    best.is_none_or(|(s, face)| hit.t < s || (hit.t == s && 2 * first < face));
-                if hit.t <= 0.0 || hit.t > limit || !nearer {
-                    return f32::INFINITY;
-                }
-                best = Some((
-                    hit.t,
-                    2 * (first + elements::piece(n, hit.b1, hit.b2)) + u32::from(!hit.upper),
-                ));
                 // a hair farther, so that rounding to f32 cannot hide a nearer triangle
-                ((hit.t - entered) * self.scale) as f32 * (1.0 + 1e-6) + 2.0 * NEAREST_NODE as f32
+                ((nearest - entered) * self.scale) as f32 * (1.0 + 1e-6) + 2.0 * NEAREST_NODE as f32
             });
-        best
+        best.map(|hit| (hit.t, hit.face))
     }
+
+    /// How far apart along a ray two surfaces like this one may be met and still touch.
+    fn touch_in_t(&self, triangle: &[DVec3; 3], direction: DVec3, t: f64) -> f64 {
+        // far beyond any rounding no cosine need be known
+        if t.abs() > self.touch_m / SMALLEST_COSINE {
+            return self.touch_m;
+        }
+        let normal = geometry::doubled_area_vector(triangle);
+        let cosine = (normal.dot(direction) / normal.length()).abs();
+        self.touch_m / cosine.max(SMALLEST_COSINE)
+    }
+}
+
+/// A direction for obvhs, which loses boxes along a ray that is exactly parallel to an axis: infinity times
+/// zero is no number.
+fn tree_direction(direction: DVec3) -> Vec3A {
+    let along = |d: f32| if d.abs() < 1e-12 { 1e-12 } else { d };
+    let d = direction.as_vec3a();
+    Vec3A::new(along(d.x), along(d.y), along(d.z))
+}
+
+/// Surfaces that are met at a smaller angle than this are not asked whether they touch.
+const SMALLEST_COSINE: f64 = 1e-6;
+
+/// The nearest triangle so far.
+struct Hit {
+    t: f64,
+    /// Triangle and copy.
+    place: (u32, Shift),
+    face: u32,
 }
 
 /// A ray from a face.
@@ -285,24 +360,6 @@ fn beyond(block: &Block, origin: DVec3, direction: DVec3, soil_t: f64, random: f
     })
 }
 
-/// Shifts by whole patterns that bring the box `a..b` into the pattern.
-fn copies(block: &Block, a: DVec2, b: DVec2) -> Vec<Shift> {
-    let extent = &block.extent;
-    if !extent.periodic {
-        return vec![[0, 0]];
-    }
-    let (min, max) = (extent.min_m.truncate(), extent.max_m.truncate());
-    let size = max - min;
-    let (first, last) = (((min - b) / size).ceil(), ((max - a) / size).floor());
-    let mut shifts = Vec::new();
-    for i in first.x as i64..=last.x as i64 {
-        for j in first.y as i64..=last.y as i64 {
-            shifts.push([i, j]);
-        }
-    }
-    shifts
-}
-
 /// Where a ray that is in the rectangle leaves it, and by which step of the pattern.
 fn exit(home: DVec3, direction: DVec3, min: DVec2, max: DVec2) -> (f64, Shift) {
     let side = |p: f64, d: f64, lo: f64, hi: f64| match d {
@@ -330,67 +387,4 @@ fn soil_cell(block: &Block, at: DVec3) -> Option<u32> {
     };
     let inside = k.cmpge(DVec2::ZERO).all() && k.cmplt(cells).all();
     inside.then(|| k.y as u32 * soil.cells[0] + k.x as u32)
-}
-
-struct Meeting {
-    t: f64,
-    b1: f64,
-    b2: f64,
-    /// The ray arrives on the upper face.
-    upper: bool,
-}
-
-/// Watertight ray-triangle test (Woop, Benthin & Wald 2013), in f64: both triangles at an edge
-/// evaluate the same products, so a ray through the edge meets at least one of them.
-struct Edges {
-    axes: [usize; 3],
-    shear: [f64; 3],
-    /// The axes were swapped to keep their handedness.
-    flipped: bool,
-}
-
-impl Edges {
-    fn new(direction: DVec3) -> Self {
-        let d = direction.to_array();
-        let a = direction.abs();
-        let kz = if a.x > a.y && a.x > a.z {
-            0
-        } else if a.y > a.z {
-            1
-        } else {
-            2
-        };
-        let (kx, ky) = ((kz + 1) % 3, (kz + 2) % 3);
-        Self {
-            axes: [kx, ky, kz],
-            shear: [d[kx] / d[kz], d[ky] / d[kz], 1.0 / d[kz]],
-            flipped: d[kz] < 0.0,
-        }
-    }
-
-    fn meet(&self, triangle: &[DVec3; 3], origin: DVec3) -> Option<Meeting> {
-        let [kx, ky, kz] = self.axes;
-        let [sx, sy, sz] = self.shear;
-        let [a, b, c] = triangle.map(|p| {
-            let p = (p - origin).to_array();
-            [p[kx] - sx * p[kz], p[ky] - sy * p[kz], sz * p[kz]]
-        });
-        let u = c[0] * b[1] - c[1] * b[0];
-        let v = a[0] * c[1] - a[1] * c[0];
-        let w = b[0] * a[1] - b[1] * a[0];
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
-            return None;
-        }
-        let det = u + v + w;
-        if det == 0.0 {
-            return None;
-        }
-        let t = (u * a[2] + v * b[2] + w * c[2]) / det;
-        Some(Meeting {
-            t,
-            b1: v / det,
-            b2: w / det,
-            upper: (det > 0.0) != self.flipped,
-        })
-    }
 }

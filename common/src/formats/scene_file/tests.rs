@@ -193,7 +193,7 @@ fn what_is_wrong_is_named_with_its_line() {
         ),
         (
             "[light.sky]\nkind = 'uniform_overcast'\nirradiance_W_m2 = { PAR = -1 }\n",
-            "a.toml, line 1: irradiance in band PAR: expected a finite number of at least 0",
+            "a.toml, line 1: irradiance in band PAR: expected 0 or 1e-100 to 1e100",
         ),
         (
             "[light.sky]\nkind = 'uniform_overcast'\nlatitude_deg = 3\nirradiance_W_m2 = {}\n",

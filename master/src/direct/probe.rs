@@ -1,0 +1,134 @@
+//! Rays towards a source, from organs that its lattice meets too seldom to say anything of them.
+
+use glam::DVec3;
+use nestrad_common::directions::{Purpose, stream};
+use nestrad_common::elements::piece_corners;
+use nestrad_common::geometry;
+use nestrad_common::problem::Problem;
+use nestrad_worker::{Block, BlockFault, Tracer};
+use rand::RngExt;
+use rayon::prelude::*;
+
+use crate::exchange::{BlockOf, block_message};
+use crate::world::World;
+
+/// An organ of less area than this many points is probed,
+const THIN_POINTS: f64 = 64.0;
+
+/// and so is one that is nearly along the light, and is met by fewer points than this, on average.
+const ALONG_POINTS: f64 = 4.0;
+
+/// Rays for an organ.
+const RAYS: f64 = 64.0;
+
+/// Where all organs and sources together would need more rays than this, none is probed: then there are
+/// so many small organs that the lattice is right for all of them together, and its error is stated for
+/// each.
+const MOST_RAYS: f64 = 1e7;
+
+/// The scene as rays see it.
+pub(super) struct Probe {
+    block: Block,
+    tracer: Tracer,
+    seed: u64,
+}
+
+/// Which organs are too small for a lattice.
+pub(super) struct Thin {
+    /// By organ.
+    pub(super) organ: Vec<bool>,
+    /// Area of each organ, perpendicular to the source, m².
+    pub(super) projected_m2: Vec<f64>,
+}
+
+impl Thin {
+    pub(super) fn of(problem: &Problem, towards: DVec3, line_area_m2: f64) -> Self {
+        let scene = &problem.scene;
+        let mut area_m2 = vec![0.0; scene.organs.len()];
+        let mut projected_m2 = vec![0.0; scene.organs.len()];
+        for (t, triangle) in scene.triangles.iter().enumerate() {
+            let (o, normal) = (
+                scene.organ[t] as usize,
+                geometry::doubled_area_vector(triangle),
+            );
+            area_m2[o] += 0.5 * normal.length();
+            projected_m2[o] += 0.5 * normal.dot(towards).abs();
+        }
+        let is_thin = |(area, projected): (&f64, &f64)| {
+            *projected > 0.0
+                && (*area < THIN_POINTS * line_area_m2 || *projected < ALONG_POINTS * line_area_m2)
+        };
+        Self {
+            organ: area_m2.iter().zip(&projected_m2).map(is_thin).collect(),
+            projected_m2,
+        }
+    }
+
+    /// Whether there is any.
+    pub(super) fn any(&self) -> bool {
+        self.organ.contains(&true)
+    }
+
+    /// Leaves all of them to the lattice.
+    pub(super) fn forget(&mut self) {
+        self.organ.fill(false);
+    }
+}
+
+impl Probe {
+    /// For organs that are too small for the lattices of these cross-sections (m², per source), if there
+    /// are any.
+    pub(super) fn new(
+        problem: &Problem,
+        world: &World,
+        line_area_m2: &[f64],
+        seed: u64,
+    ) -> Result<Option<Self>, BlockFault> {
+        let thin = |k: usize| {
+            let thin = Thin::of(problem, -problem.sources[k].direction, line_area_m2[k]);
+            thin.organ.iter().filter(|&&thin| thin).count()
+        };
+        let organs: usize = (0..problem.sources.len()).into_par_iter().map(thin).sum();
+        if organs == 0 || organs as f64 * RAYS > MOST_RAYS {
+            return Ok(None);
+        }
+        let mut message = block_message(&problem.scene, world, &BlockOf::whole(world));
+        if let Some(world) = &mut message.world {
+            // the sun is farther away than any sphere
+            (world.sphere_radius_m, world.far_levels) = (f64::INFINITY, 0);
+        }
+        let block = Block::new(&message)?;
+        Ok(Some(Self {
+            tracer: Tracer::new(&block),
+            block,
+            seed,
+        }))
+    }
+
+    /// Rays for an element that is this part of its organ.
+    pub(super) fn rays_of(part: f64) -> u32 {
+        (RAYS * part).ceil().clamp(1.0, RAYS) as u32
+    }
+
+    /// How many of `rays` rays from an element towards source number `source` meet nothing.
+    pub(super) fn lit(
+        &self,
+        world: &World,
+        element: usize,
+        (source, towards): (usize, DVec3),
+        rays: u32,
+    ) -> u32 {
+        let t = world.triangle_of_element[element];
+        let triangle = &world.soup.triangles()[t as usize];
+        let local = element as u32 - world.elements.first[t as usize];
+        let corners = piece_corners(world.elements.divisions[t as usize], local);
+        let index = (source as u64 + 1) << 32 | element as u64;
+        let mut rng = stream(self.seed, Purpose::Direct, index);
+        let free = (0..rays).filter(|_| {
+            let origin = geometry::point_within(triangle, &corners, [rng.random(), rng.random()]);
+            self.tracer
+                .sees_sky(&self.block, (t, element as u32), origin, towards)
+        });
+        free.count() as u32
+    }
+}

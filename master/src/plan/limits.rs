@@ -1,0 +1,72 @@
+//! What no plan can be made for, whatever the memory.
+
+use nestrad_common::elements::Elements;
+use nestrad_common::geometry;
+use nestrad_common::lattice::DEPTH_OF_TOP;
+use nestrad_common::problem::Problem;
+
+use super::{PlanError, Scale, Settings};
+
+/// The accuracy below which the number of directions would pass a million, percent.
+const LEAST_ACCURACY_PERCENT: f64 = 0.01;
+
+/// Most copies of the pattern that one triangle may reach into.
+const MOST_PATTERNS: f64 = 1e4;
+
+/// A step in height may be this part of a triangle.
+const FINEST_STEP: f64 = 1e-3;
+
+/// Elements have two faces, and faces and soil cells are numbered with 32 bits.
+const MOST_ELEMENTS: u64 = 1 << 30;
+
+pub(super) fn check_accuracy(settings: &Settings) -> Result<(), PlanError> {
+    let (least, found) = (LEAST_ACCURACY_PERCENT, settings.accuracy_percent);
+    if found >= least {
+        Ok(())
+    } else {
+        Err(PlanError::Accuracy { least, found })
+    }
+}
+
+pub(super) fn check_overhang(problem: &Problem) -> Result<(), PlanError> {
+    let Some(pattern) = problem.scene.pattern else {
+        return Ok(());
+    };
+    for (triangle, corners) in problem.scene.triangles.iter().enumerate() {
+        let Some((lo, hi)) = geometry::bounds(corners) else {
+            continue;
+        };
+        let copies = (hi - lo).truncate() / pattern.size_m + 1.0;
+        let patterns = copies.x * copies.y;
+        if patterns > MOST_PATTERNS {
+            return Err(PlanError::Overhang {
+                triangle,
+                patterns,
+                most: MOST_PATTERNS,
+            });
+        }
+    }
+    Ok(())
+}
+
+pub(super) fn check_height(scale: &Scale) -> Result<(), PlanError> {
+    let step_m = scale.height_m / f64::from(DEPTH_OF_TOP);
+    let triangle_m = scale.triangle_area_m2.sqrt();
+    if step_m > FINEST_STEP * triangle_m && triangle_m > 0.0 {
+        return Err(PlanError::Height {
+            height_m: scale.height_m,
+            step_m,
+            triangle_m,
+        });
+    }
+    Ok(())
+}
+
+pub(super) fn check_elements(problem: &Problem, max_edge_m: f64) -> Result<(), PlanError> {
+    let (found, most) = (Elements::count(&problem.scene, max_edge_m), MOST_ELEMENTS);
+    if found <= most {
+        Ok(())
+    } else {
+        Err(PlanError::Elements { found, most })
+    }
+}
