@@ -5,7 +5,6 @@ use nestrad_common::problem::Problem;
 
 use crate::direct::Direct;
 use crate::exchange::Outlook;
-use crate::far_field::closure::flux_weight;
 use crate::solution::{Balance, Estimate, ItemLight, SoilMap, Solution};
 use crate::solver::{Irradiance, Variances};
 use crate::world::{self, World};
@@ -192,7 +191,7 @@ impl Parts<'_> {
     fn escaped_W(&self, band: &Band, k: usize) -> [f64; 2] {
         let world = self.world;
         if world.ends.far_len() > 0 {
-            return self.escaped_far_W(k);
+            return self.irradiance.leaving_W_m2[k].map(|w| w * world.ground_area_m2());
         }
         let mut sum = [0.0; 2];
         for (half, irradiance) in self.irradiance.halves.iter().enumerate() {
@@ -220,25 +219,6 @@ impl Parts<'_> {
             }
             for row in world.ends.faces() as usize..world.rows() {
                 add(row, band.soil_albedo * on(row));
-            }
-        }
-        sum
-    }
-}
-
-impl Parts<'_> {
-    /// Scattered power that leaves through the top and bottom levels of the far field, W.
-    fn escaped_far_W(&self, k: usize) -> [f64; 2] {
-        let ends = &self.world.ends;
-        let of = |end: u32| {
-            self.irradiance.far_W_m2[(end - ends.far_start()) as usize * self.irradiance.bands + k]
-        };
-        let mut sum = [0.0; 2];
-        for bin in 0..ends.far_bins {
-            let weight = self.world.ground_area_m2() * flux_weight(bin, ends.far_bins);
-            sum[0] += weight * of(ends.far_from_below(bin, ends.far_levels - 1));
-            if self.world.soil.is_none() {
-                sum[1] += weight * of(ends.far_from_above(bin, 0));
             }
         }
         sum

@@ -71,12 +71,10 @@ fn a_growing_sphere_comes_ever_closer_to_plain_radiosity() {
                 error <= last.max(0.003),
                 "band {band}, D = {diameter} m: {error}"
             );
-            // 0.0259 was measured in NIR at D = 0.2 m: the stated errors leave the far field's model out.
-            // The design's table for R = 0.1 m (2.4 to 3.8 %) is of organs, not of the balance, so this
-            // bound is what the model does today and not what theory asks for.
-            let mean_field = if diameter < 0.5 { 0.04 } else { 0.02 };
+            // what one end of a long line of sight sends out is what the others get: only the sampling of
+            // the field itself is left, which the stated errors leave out
             assert!(
-                closure.abs() < mean_field,
+                closure.abs() < 0.005,
                 "band {band}, D = {diameter} m: closure {closure}"
             );
             last = error;

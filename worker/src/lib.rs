@@ -35,8 +35,8 @@ pub fn trace(block: &Block, tracer: &Tracer, batch: &v1::Batch) -> v1::Rows {
     rows::collect(block, &traced)
 }
 
-/// What is seen from the levels of the far field, along the lines of a batch: one row for each far
-/// end, in their order. The block is the whole scene.
-pub fn trace_levels(block: &Block, batch: &v1::Batch) -> v1::Rows {
-    rows::of_levels(block, &lines::from_levels(block, batch))
+/// What the far field is the mean of, along the lines of a batch: a row for each far end, in their order,
+/// then one for what leaves upwards and one for what leaves downwards. The block is the whole scene.
+pub fn trace_far_field(block: &Block, batch: &v1::Batch) -> v1::Rows {
+    rows::of_far_field(block, &lines::beyond_sphere(block, batch))
 }

@@ -58,11 +58,11 @@ pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
     }
 }
 
-/// Sorts what levels see into rows of the far ends.
-pub(crate) fn of_levels(block: &Block, looks: &[Pair]) -> v1::Rows {
+/// Sorts looks into rows of the far ends and of the two ways out.
+pub(crate) fn of_far_field(block: &Block, looks: &[Pair]) -> v1::Rows {
     let first = block.local(block.ends.far_start());
     let mut rows = v1::Rows {
-        lengths: vec![0; block.ends.far_len() as usize],
+        lengths: vec![0; block.ends.far_len() as usize + 2],
         ..v1::Rows::default()
     };
     for &(from, _) in looks {

@@ -1,5 +1,6 @@
-//! The far field closed on the solution: what comes to a level from a bin is the mean of what lines
-//! through the whole scene see from there, of faces whose radiosities are being solved for.
+//! The far field closed on the solution: what comes from a level and bin is the mean of what stands at the
+//! other end of the lines of sight that pass there out of the sphere, faces whose radiosities are being
+//! solved for.
 //!
 //! So each level and bin is a row of its own, next to the rows of the faces, and its radiosity
 //! (pi times the radiance) is the plain mean over its entries. The layer model gives the start.
@@ -31,10 +32,10 @@ pub struct Resolution {
     pub seed: u64,
 }
 
-/// What levels see, from two independent halves of lines.
+/// What the far field is the mean of, from two independent halves of lines.
 #[derive(Clone, Debug, Default)]
 pub struct FarRows {
-    /// A row for each far end.
+    /// A row for each far end, then one for all that leaves upwards and one for all that leaves downwards.
     pub halves: [BatchRows; 2],
 }
 
@@ -62,7 +63,7 @@ impl FarRows {
                 (Axes::Both, resolution.sets),
                 line_area_m2,
             );
-            let seen = nestrad_worker::trace_levels(&block, &batch);
+            let seen = nestrad_worker::trace_far_field(&block, &batch);
             *rows = BatchRows::new(&seen.lengths, seen.ends);
         }
         Ok(rows)
@@ -109,8 +110,3 @@ pub fn from_layers(problem: &Problem, world: &World, resolution: &Resolution) ->
 
 /// Classes of leaf inclination in the layers: against 900 they change the albedo by less than 2e-5.
 const INCLINATION_CLASSES: u32 = 18;
-
-/// The part of a hemisphere's flux that comes from each bin: `2 mu dmu` over the bin.
-pub fn flux_weight(bin: u32, bins: u32) -> f64 {
-    f64::from(2 * bin + 1) / f64::from(bins * bins)
-}

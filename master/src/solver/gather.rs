@@ -221,6 +221,21 @@ impl<'a, const N: usize> Gather<'a, N> {
         });
     }
 
+    /// What leaves upwards and downwards through a far field, W per m² of ground: the mean over lines through
+    /// the whole scene, of which there are as many along a direction as it has flux.
+    pub(super) fn leaving<L: Lane<N>>(&self, half: usize, radiosity: &[L]) -> [[f64; N]; 2] {
+        let Some(far) = self.far else {
+            return [[0.0; N]; 2];
+        };
+        [0, 1].map(|way: usize| {
+            if way == 1 && self.world.soil.is_some() {
+                return [0.0; N];
+            }
+            let ends = far.halves[half].row(self.world.ends.far_len() as usize + way);
+            gather(ends, radiosity).map(|s| s / ends.len().max(1) as f64)
+        })
+    }
+
     /// Power that irradiances make all rows absorb, summed without regard to sign, W (see
     /// [`Self::counted_area_m2`]).
     pub(super) fn absorbed<L: Lane<N>>(&self, irradiance: &[L]) -> [f64; N] {

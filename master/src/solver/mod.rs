@@ -70,8 +70,8 @@ pub enum SolveError {
 pub struct Irradiance {
     /// From the first and from the second half, W m⁻², indexed `row * bands + band`.
     pub halves: [Vec<f64>; 2],
-    /// Radiosity (pi times radiance) of the far ends, W m⁻², indexed `far end * bands + band`.
-    pub far_W_m2: Vec<f64>,
+    /// What leaves upwards and downwards through the far field, W per m² of ground, per band.
+    pub leaving_W_m2: Vec<[f64; 2]>,
     /// Bands, as indexed here.
     pub bands: usize,
     /// Passes over all rows that it took.
@@ -101,7 +101,7 @@ pub struct System<'a> {
     pub exchange: &'a Exchange,
     /// What of it is not a radiosity to solve for.
     pub outlook: &'a Outlook,
-    /// What the levels of the far field see, where there is one.
+    /// What the far field is the mean of, where there is one.
     pub far: Option<&'a FarRows>,
     /// E0, indexed `row * all bands + band`.
     pub direct_W_m2: &'a [f64],
@@ -117,10 +117,9 @@ impl System<'_> {
     /// these numbers.
     pub fn solve(&self, bands: &[usize], tolerance: &Tolerance) -> Result<Irradiance, SolveError> {
         let rows = vec![0.0; self.world.rows() * bands.len()];
-        let far = vec![0.0; self.world.ends.far_len() as usize * bands.len()];
         let mut all = Irradiance {
             halves: [rows.clone(), rows],
-            far_W_m2: far,
+            leaving_W_m2: vec![[0.0; 2]; bands.len()],
             bands: bands.len(),
             passes: 0,
             left: vec![0.0; bands.len()],
@@ -242,14 +241,12 @@ impl Group<'_> {
                 }
             }
         }
-        let far_start = self.system.world.ends.far_start() as usize;
-        for (row, (p, q)) in pass.x.radiosity[far_start..]
-            .iter()
-            .zip(&pass.y.radiosity[far_start..])
-            .enumerate()
-        {
+        for (half, from) in [&pass.x, &pass.y].into_iter().enumerate() {
+            let leaving = pass.gather.leaving(half, &from.radiosity);
             for k in 0..self.bands.len() {
-                all.far_W_m2[row * all.bands + first + k] = 0.5 * (p[k] + q[k]);
+                for (sum, way) in all.leaving_W_m2[first + k].iter_mut().zip(leaving) {
+                    *sum += 0.5 * way[k];
+                }
             }
         }
     }

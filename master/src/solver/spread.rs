@@ -13,7 +13,6 @@ use rayon::prelude::*;
 use super::gather::Gather;
 use super::lane::{Lane, PULLED_TOGETHER, PULLS, Pull};
 use super::{HALF_BATCHES, System};
-use crate::far_field::closure::flux_weight;
 use crate::world;
 
 /// A number for each batch.
@@ -40,10 +39,10 @@ pub(super) struct Spread<'a> {
     pub(super) bands: &'a [usize],
 }
 
-/// What a pull does to irradiances and to the radiosities of the far ends.
+/// What a pull does to irradiances, and to what leaves through the far field.
 struct Change {
     irradiance: Vec<Pull>,
-    far: Vec<Pull>,
+    leaving: [Pull; 2],
 }
 
 /// What of a pull is still on its way when it is no longer followed, in parts of the pull.
@@ -118,20 +117,21 @@ impl Spread<'_> {
                 break;
             }
         }
-        let mean = |a: &[Pull], b: &[Pull]| {
-            let mean = |(a, b): (&Pull, &Pull)| {
-                let (a, b) = (a.get(), b.get());
-                Pull::of(std::array::from_fn(|g| 0.5 * (a[g] + b[g])))
-            };
-            a.par_iter().zip(b).map(mean).collect()
+        let mean = |a: [f64; PULLS], b: [f64; PULLS]| {
+            Pull::of(std::array::from_fn(|g| 0.5 * (a[g] + b[g])))
         };
-        let far_start = world.ends.far_start() as usize;
+        let leaving = [
+            gather.leaving(half, &pulled.radiosity),
+            gather.leaving(1 - half, &other.radiosity),
+        ];
         Change {
-            irradiance: mean(&pulled.irradiance, &other.irradiance),
-            far: mean(
-                &pulled.radiosity[far_start..],
-                &other.radiosity[far_start..],
-            ),
+            irradiance: pulled
+                .irradiance
+                .par_iter()
+                .zip(&other.irradiance)
+                .map(|(a, b)| mean(a.get(), b.get()))
+                .collect(),
+            leaving: [0, 1].map(|way: usize| mean(leaving[0][way], leaving[1][way])),
         }
     }
 
@@ -139,7 +139,6 @@ impl Spread<'_> {
     fn collect(&self, of: &Change, (k, unit): (usize, f64), sum: &mut Variances) {
         let pull = |of: &Pull| of.of_band(k).map(|x| x * unit);
         let change: Vec<PerBatch> = of.irradiance.iter().map(pull).collect();
-        let far: Vec<PerBatch> = of.far.iter().map(pull).collect();
         let (scene, elements) = (&self.system.problem.scene, self.system.world.elements.len());
         let band = &self.system.problem.bands[self.bands[k]];
         let soil_triangle = world::is_soil(scene);
@@ -171,21 +170,10 @@ impl Spread<'_> {
             self.escape(&mut balance, row, band.soil_albedo * area, pull);
             sum.soil_W2_m4[cell] += variance(pull);
         }
-        if !far.is_empty() {
-            // what leaves the scene crosses its top and bottom levels
-            let (world, ends) = (self.system.world, &self.system.world.ends);
-            (balance[2], balance[3]) = ([0.0; HALF_BATCHES], [0.0; HALF_BATCHES]);
-            for bin in 0..ends.far_bins {
-                let weight = world.ground_area_m2() * flux_weight(bin, ends.far_bins);
-                let at = |end: u32| &far[(end - ends.far_start()) as usize];
-                add(
-                    &mut balance[2],
-                    weight,
-                    at(ends.far_from_below(bin, ends.far_levels - 1)),
-                );
-                if world.soil.is_none() {
-                    add(&mut balance[3], weight, at(ends.far_from_above(bin, 0)));
-                }
+        if self.system.far.is_some() {
+            let ground_m2 = self.system.world.ground_area_m2();
+            for (balance, leaving) in balance[2..].iter_mut().zip(&of.leaving) {
+                *balance = pull(leaving).map(|x| ground_m2 * x);
             }
         }
         for (sum, organ) in sum.organ_W2.iter_mut().zip(&organs) {

@@ -3,7 +3,6 @@
 
 mod burial;
 mod fragments;
-mod levels;
 mod sight;
 
 use glam::DVec3;
@@ -29,15 +28,15 @@ pub(crate) fn trace(block: &Block, batch: &v1::Batch) -> Traced {
     }
 }
 
-/// What the lines of a batch see, upwards and downwards, from the levels of the far field: (far end,
-/// what it sees), by direction and line.
-pub(crate) fn from_levels(block: &Block, batch: &v1::Batch) -> Vec<Pair> {
+/// What stands at the other end of the looks into the far field, along the lines of a batch: (far end, what
+/// is there), by direction and line; past the last end, what leaves upwards and downwards.
+pub(crate) fn beyond_sphere(block: &Block, batch: &v1::Batch) -> Vec<Pair> {
     let of_direction = |lines: &v1::Lines| {
         let mut looks = Vec::new();
         if let Some(lattice) = lattice(block, lines).filter(|l| l.lines() > 0) {
-            let levels = levels::Levels::new(block, &lattice);
+            let sight = sight::Sight::new(block, &lattice);
             fragments::for_each_line(block, &lattice, part(lines), |line, hits| {
-                levels.along(line, hits, &mut looks);
+                sight.beyond(line, hits, &mut looks);
             });
         }
         looks

@@ -54,12 +54,7 @@ impl<'a> Sight<'a> {
     }
 
     fn neighbours(&self, line: usize, hits: &[Hit], soil_depth: u32, pairs: &mut Vec<Pair>) {
-        let bottom = match &self.soil {
-            Some(soil) => soil
-                .cell(line)
-                .map_or(self.below, |c| self.block.local(self.block.ends.soil(c))),
-            None => self.below,
-        };
+        let bottom = self.bottom(line);
         let Some(radius) = self.radius else {
             let mut seen = bottom;
             for hit in hits {
@@ -84,6 +79,44 @@ impl<'a> Sight<'a> {
             (seen, depth) = (hit.face_along(), hit.depth());
         }
         pairs.push((seen, self.far_above(line, depth, radius)));
+    }
+
+    /// Adds what stands, along one line, at the other end of each look into the far field: (far end, what
+    /// is there), and what leaves at the line's ends.
+    ///
+    /// So the far field is the mean over just those lines of sight that are longer than the sphere reaches,
+    /// and what one end of them sends out is what the others get.
+    pub(crate) fn beyond(&self, line: usize, hits: &[Hit], looks: &mut Vec<Pair>) {
+        let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
+        let hits = &hits[hits.partition_point(|h| h.depth() < soil_depth)..];
+        let bottom = self.bottom(line);
+        let leaves = self.block.seen_as.len() as u32;
+        looks.push((leaves, hits.last().map_or(bottom, |h| h.face_along())));
+        looks.push((
+            leaves + 1,
+            hits.first().map_or(self.sky, |h| h.face_against()),
+        ));
+        let Some(radius) = self.radius else { return };
+        let (mut seen, mut depth) = (bottom, soil_depth);
+        for hit in hits {
+            if hit.depth().saturating_sub(depth) > radius {
+                if seen != self.below {
+                    looks.push((self.far_above(line, depth, radius), hit.face_against()));
+                }
+                looks.push((self.far_below(line, hit.depth(), radius), seen));
+            }
+            (seen, depth) = (hit.face_along(), hit.depth());
+        }
+        let above = self.far_above(line, depth, radius);
+        if above != self.sky && seen != self.below {
+            looks.push((above, self.sky));
+        }
+    }
+
+    /// What is at the lower end of a line.
+    fn bottom(&self, line: usize) -> u32 {
+        let cell = self.soil.as_ref().and_then(|soil| soil.cell(line));
+        cell.map_or(self.below, |c| self.block.local(self.block.ends.soil(c)))
     }
 
     /// What is seen upwards, where nothing is hit within the sphere.
@@ -117,7 +150,7 @@ impl<'a> Sight<'a> {
 }
 
 /// The soil cells at the lower ends of the lines.
-pub(super) struct SoilUnder {
+struct SoilUnder {
     depth: u32,
     /// Column and row of cells for each column and row of the lattice; `None` beyond the map.
     column: Vec<Option<u32>>,
@@ -126,7 +159,7 @@ pub(super) struct SoilUnder {
 }
 
 impl SoilUnder {
-    pub(super) fn new(soil: &Soil, lattice: &Lattice) -> Self {
+    fn new(soil: &Soil, lattice: &Lattice) -> Self {
         let cell = |x: f64, min: f64, size: f64, cells: u32| {
             let k = ((x - min) / size).floor();
             if lattice.periodic {
@@ -148,13 +181,8 @@ impl SoilUnder {
         }
     }
 
-    /// Of the soil plane, along the lines.
-    pub(super) fn depth(&self) -> u32 {
-        self.depth
-    }
-
     /// The cell at the lower end of a line.
-    pub(super) fn cell(&self, line: usize) -> Option<u32> {
+    fn cell(&self, line: usize) -> Option<u32> {
         let nx = self.column.len();
         Some(self.row[line / nx]? * self.columns + self.column[line % nx]?)
     }
