@@ -1,6 +1,9 @@
 //! From pairs that see each other to rows.
 
+use std::ops::Range;
+
 use nestrad_proto::v1;
+use rayon::prelude::*;
 
 use crate::block::Block;
 
@@ -18,28 +21,18 @@ pub(crate) struct Traced {
     pub(crate) rays: u64,
 }
 
-/// Sorts pairs into rows, stably: by counting, so the cost is linear.
+/// Rows that are sorted together: their counters fit a first-level cache.
+const SORTED_TOGETHER: usize = 1 << 13;
+
+/// Sorts pairs into rows, stably, at a cost that is linear: first into runs of rows, then by counting
+/// within each run, so that neither reaches over more memory than a cache holds.
 pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
-    // what has no row is counted past the last one, so that counting needs no branch
-    let row = |local: u32| block.row[local as usize] as usize;
-    let mut next = vec![0u32; block.rows + 1];
-    for &(a, b) in traced.pairs.iter().flatten() {
-        next[row(a)] += 1;
-        next[row(b)] += 1;
-    }
-    for &(a, _) in &traced.looks {
-        next[row(a)] += 1;
-    }
-    let lengths = next[..block.rows].to_vec();
-    let mut total = 0;
-    for place in &mut next {
-        total += std::mem::replace(place, total);
-    }
-    let mut ends = vec![0u32; total as usize];
+    let mut runs: Vec<Vec<Pair>> = vec![Vec::new(); block.rows.div_ceil(SORTED_TOGETHER)];
     let mut put = |from: u32, seen: u32| {
-        let place = &mut next[row(from)];
-        ends[*place as usize] = block.seen_as[seen as usize];
-        *place += 1;
+        let row = block.row[from as usize];
+        if (row as usize) < block.rows {
+            runs[row as usize / SORTED_TOGETHER].push((row, block.seen_as[seen as usize]));
+        }
     };
     for &(a, b) in traced.pairs.iter().flatten() {
         put(a, b);
@@ -48,40 +41,57 @@ pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
     for &(a, b) in &traced.looks {
         put(a, b);
     }
-    ends.truncate(lengths.iter().map(|&l| l as usize).sum());
+    let (lengths, ends): (Vec<Vec<u32>>, Vec<Vec<u32>>) = runs
+        .into_par_iter()
+        .enumerate()
+        .map(|(run, entries)| {
+            let first = run * SORTED_TOGETHER;
+            sorted_by_row(&entries, first..(first + SORTED_TOGETHER).min(block.rows))
+        })
+        .unzip();
     v1::Rows {
-        lengths,
-        ends,
+        lengths: lengths.concat(),
+        ends: ends.concat(),
         lines: traced.lines,
         segments: traced.pairs.iter().map(|p| p.len() as u64).sum(),
         rays: traced.rays,
     }
 }
 
+/// Lengths of some rows, and what they see, from (row, what it sees).
+fn sorted_by_row(entries: &[Pair], rows: Range<usize>) -> (Vec<u32>, Vec<u32>) {
+    let mut lengths = vec![0u32; rows.len()];
+    for &(row, _) in entries {
+        lengths[row as usize - rows.start] += 1;
+    }
+    let mut total = 0;
+    let mut next: Vec<u32> = lengths
+        .iter()
+        .map(|l| {
+            total += l;
+            total - l
+        })
+        .collect();
+    let mut ends = vec![0; entries.len()];
+    for &(row, seen) in entries {
+        let place = &mut next[row as usize - rows.start];
+        ends[*place as usize] = seen;
+        *place += 1;
+    }
+    (lengths, ends)
+}
+
 /// Sorts looks into rows of the far ends and of the two ways out.
 pub(crate) fn of_far_field(block: &Block, looks: &[Pair]) -> v1::Rows {
     let first = block.local(block.ends.far_start());
-    let mut rows = v1::Rows {
-        lengths: vec![0; block.ends.far_len() as usize + 2],
-        ..v1::Rows::default()
-    };
-    for &(from, _) in looks {
-        rows.lengths[(from - first) as usize] += 1;
-    }
-    let mut total = 0;
-    let mut next: Vec<usize> = rows
-        .lengths
+    let entries: Vec<Pair> = looks
         .iter()
-        .map(|&l| {
-            total += l as usize;
-            total - l as usize
-        })
+        .map(|&(from, seen)| (from - first, block.seen_as[seen as usize]))
         .collect();
-    rows.ends = vec![0; total];
-    for &(from, seen) in looks {
-        let place = &mut next[(from - first) as usize];
-        rows.ends[*place] = block.seen_as[seen as usize];
-        *place += 1;
+    let (lengths, ends) = sorted_by_row(&entries, 0..block.ends.far_len() as usize + 2);
+    v1::Rows {
+        lengths,
+        ends,
+        ..v1::Rows::default()
     }
-    rows
 }

@@ -20,7 +20,7 @@ pub(super) struct Buffer {
 }
 
 /// Points in a strip: its buffer fits a second-level cache.
-const LINES_IN_STRIP: usize = 1 << 16;
+const LINES_IN_STRIP: usize = 1 << 17;
 
 impl Buffer {
     /// Draws all triangles strip by strip. `drawn` is called for each point of each element, `strip`
