@@ -34,6 +34,9 @@ pub struct Block {
     pub(crate) row: Vec<u32>,
     /// Number of rows.
     pub(crate) rows: usize,
+    /// Local ends have the numbers of the scene, and rows have the numbers of ends: a block of the whole
+    /// scene.
+    whole: bool,
 }
 
 /// The mapped soil plane.
@@ -143,7 +146,11 @@ impl Block {
         for r in &mut row {
             *r = (*r).min(rows);
         }
+        let is_own = |(k, &number): (usize, &u32)| number as usize == k;
+        let whole = seen_as.iter().enumerate().all(is_own)
+            && row[..rows as usize].iter().enumerate().all(is_own);
         Ok(Self {
+            whole,
             extent: Extent {
                 min_m,
                 max_m,
@@ -189,6 +196,17 @@ impl Block {
     /// Whether a local end is the inside of something solid.
     pub(crate) fn is_inside(&self, local: u32) -> bool {
         local < self.local_faces && local % 2 == 1 && self.is_solid(local)
+    }
+
+    /// The row of a local end, and what another is seen as there; `None` where no row is wanted.
+    #[inline]
+    pub(crate) fn entry(&self, from: u32, seen: u32) -> Option<(u32, u32)> {
+        let (row, seen) = if self.whole {
+            (from, seen)
+        } else {
+            (self.row[from as usize], self.seen_as[seen as usize])
+        };
+        ((row as usize) < self.rows).then_some((row, seen))
     }
 
     /// Whether rows of a local end are wanted.

@@ -29,9 +29,8 @@ const SORTED_TOGETHER: usize = 1 << 13;
 pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
     let mut runs: Vec<Vec<Pair>> = vec![Vec::new(); block.rows.div_ceil(SORTED_TOGETHER)];
     let mut put = |from: u32, seen: u32| {
-        let row = block.row[from as usize];
-        if (row as usize) < block.rows {
-            runs[row as usize / SORTED_TOGETHER].push((row, block.seen_as[seen as usize]));
+        if let Some(entry) = block.entry(from, seen) {
+            runs[entry.0 as usize / SORTED_TOGETHER].push(entry);
         }
     };
     for &(a, b) in traced.pairs.iter().flatten() {
