@@ -124,13 +124,13 @@ impl Spread<'_> {
             gather.leaving(half, &pulled.radiosity),
             gather.leaving(1 - half, &other.radiosity),
         ];
+        let mut irradiance = pulled.irradiance;
+        irradiance
+            .par_iter_mut()
+            .zip(&other.irradiance)
+            .for_each(|(a, b)| *a = mean(a.get(), b.get()));
         Change {
-            irradiance: pulled
-                .irradiance
-                .par_iter()
-                .zip(&other.irradiance)
-                .map(|(a, b)| mean(a.get(), b.get()))
-                .collect(),
+            irradiance,
             leaving: [0, 1].map(|way: usize| mean(leaving[0][way], leaving[1][way])),
         }
     }
@@ -138,7 +138,7 @@ impl Spread<'_> {
     /// Adds the variances in band `k` of the group, whose changes are in units of `unit`.
     fn collect(&self, of: &Change, (k, unit): (usize, f64), sum: &mut Variances) {
         let pull = |of: &Pull| of.of_band(k).map(|x| x * unit);
-        let change: Vec<PerBatch> = of.irradiance.iter().map(pull).collect();
+        let at = |row: usize| pull(&of.irradiance[row]);
         let (scene, elements) = (&self.system.problem.scene, self.system.world.elements.len());
         let band = &self.system.problem.bands[self.bands[k]];
         let soil_triangle = world::is_soil(scene);
@@ -155,20 +155,20 @@ impl Spread<'_> {
             for row in 2 * first[0] as usize..2 * first[1] as usize {
                 let (face, opposite) = (faces[row % 2], faces[1 - row % 2]);
                 let area = self.exposed_area_m2(row);
-                add(&mut absorbed, face.absorptance() * area, &change[row]);
-                self.escape(&mut balance, row, face.rho * area, &change[row]);
-                self.escape(&mut balance, row, opposite.tau * area, &change[row ^ 1]);
+                add(&mut absorbed, face.absorptance() * area, &at(row));
+                self.escape(&mut balance, row, face.rho * area, &at(row));
+                self.escape(&mut balance, row, opposite.tau * area, &at(row ^ 1));
             }
             add(&mut organs[scene.organ[t] as usize], 1.0, &absorbed);
             add(&mut balance[usize::from(soil_triangle[t])], 1.0, &absorbed);
             sum.triangle_W2[t] += variance(&absorbed);
         }
-        for (cell, pull) in change[2 * elements..].iter().enumerate() {
-            let row = 2 * elements + cell;
+        for row in 2 * elements..of.irradiance.len() {
+            let (cell, pull) = (row - 2 * elements, at(row));
             let area = self.exposed_area_m2(row);
-            add(&mut balance[1], (1.0 - band.soil_albedo) * area, pull);
-            self.escape(&mut balance, row, band.soil_albedo * area, pull);
-            sum.soil_W2_m4[cell] += variance(pull);
+            add(&mut balance[1], (1.0 - band.soil_albedo) * area, &pull);
+            self.escape(&mut balance, row, band.soil_albedo * area, &pull);
+            sum.soil_W2_m4[cell] += variance(&pull);
         }
         if self.system.far.is_some() {
             let ground_m2 = self.system.world.ground_area_m2();
