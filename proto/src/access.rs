@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 use thiserror::Error;
@@ -12,6 +13,9 @@ use tower::layer::util::{Identity as NoLayer, Stack};
 use crate::channel::{CONNECTION_WINDOW, KEEP_ALIVE, PemError, STREAM_WINDOW, pem};
 use crate::guard::Guard;
 use crate::token::{Token, TokenError};
+
+/// A caller that has not agreed on keys after this is sent away.
+const HANDSHAKE: Duration = Duration::from_secs(10);
 
 /// Streams of one connection at a time.
 const MAX_STREAMS: u32 = 256;
@@ -77,8 +81,9 @@ impl Access {
             .max_concurrent_streams(MAX_STREAMS)
             .http2_max_header_list_size(MAX_HEADERS);
         if let (Some(cert), Some(key)) = (&self.tls_cert, &self.tls_key) {
-            let mut setup =
-                ServerTlsConfig::new().identity(Identity::from_pem(pem(cert)?, pem(key)?));
+            let mut setup = ServerTlsConfig::new()
+                .identity(Identity::from_pem(pem(cert)?, pem(key)?))
+                .timeout(HANDSHAKE);
             if let Some(path) = &self.client_ca {
                 // health is answered without a certificate; the guard sees to the rest
                 setup = setup

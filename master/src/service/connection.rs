@@ -1,14 +1,17 @@
-//! Connections of the master: their number is bounded, and what goes over them is counted.
+//! Connections of the master: their number is bounded, what goes over them is counted, and those that
+//! are silent are closed.
 
 use std::io;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll, ready};
+use std::time::Duration;
 
 use prometheus_client::metrics::counter::Counter;
 use tokio::io::{AsyncRead, AsyncWrite, ReadBuf};
 use tokio::net::{TcpListener, TcpStream};
 use tokio::sync::{OwnedSemaphorePermit, Semaphore, mpsc};
+use tokio::time::{Instant, Sleep};
 use tokio_stream::wrappers::ReceiverStream;
 use tonic::transport::server::{Connected, TcpConnectInfo};
 
@@ -17,10 +20,17 @@ use super::metrics::{Metrics, OfDirection};
 /// Connections at a time; more wait until one is closed.
 const MAX_CONNECTIONS: usize = 4096;
 
+/// A connection on which nothing comes for so long is closed. Whoever speaks HTTP/2 answers the pings
+/// that keep it alive, and so is never silent for a third of this.
+const SILENCE: Duration = Duration::from_secs(120);
+
 /// A connection that counts its bytes.
 #[derive(Debug)]
 pub(super) struct Connection {
     stream: TcpStream,
+    /// When the last bytes came, and when to look again.
+    heard: Instant,
+    look: Pin<Box<Sleep>>,
     received: Counter,
     sent: Counter,
     metrics: Arc<Metrics>,
@@ -50,7 +60,7 @@ pub(super) fn incoming(
                 Err(error) => {
                     // of that connection, or of all for lack of files: neither ends the master
                     tracing::warn!(%error, "no connection");
-                    tokio::time::sleep(std::time::Duration::from_millis(50)).await;
+                    tokio::time::sleep(Duration::from_millis(50)).await;
                     continue;
                 }
             };
@@ -59,6 +69,8 @@ pub(super) fn incoming(
             metrics.connections.inc();
             let connection = Connection {
                 stream,
+                heard: Instant::now(),
+                look: Box::pin(tokio::time::sleep(SILENCE)),
                 received: received.clone(),
                 sent: sent.clone(),
                 metrics: metrics.clone(),
@@ -93,9 +105,25 @@ impl AsyncRead for Connection {
         into: &mut ReadBuf<'_>,
     ) -> Poll<io::Result<()>> {
         let before = into.filled().len();
-        ready!(Pin::new(&mut self.stream).poll_read(context, into))?;
-        self.received.inc_by((into.filled().len() - before) as u64);
-        Poll::Ready(Ok(()))
+        match Pin::new(&mut self.stream).poll_read(context, into) {
+            Poll::Ready(outcome) => {
+                outcome?;
+                self.heard = Instant::now();
+                self.received.inc_by((into.filled().len() - before) as u64);
+                Poll::Ready(Ok(()))
+            }
+            Poll::Pending => {
+                // the timer is set anew when it goes off, not with every byte
+                while self.look.as_mut().poll(context).is_ready() {
+                    let end = self.heard + SILENCE;
+                    if end <= Instant::now() {
+                        return Poll::Ready(Err(io::ErrorKind::TimedOut.into()));
+                    }
+                    self.look.as_mut().reset(end);
+                }
+                Poll::Pending
+            }
+        }
     }
 }
 
@@ -130,5 +158,34 @@ impl AsyncWrite for Connection {
 
     fn poll_shutdown(mut self: Pin<&mut Self>, context: &mut Context<'_>) -> Poll<io::Result<()>> {
         Pin::new(&mut self.stream).poll_shutdown(context)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use tokio::io::{AsyncReadExt, AsyncWriteExt};
+    use tokio_stream::StreamExt;
+
+    use super::*;
+
+    #[tokio::test(start_paused = true)]
+    async fn a_connection_is_counted_and_closed_when_it_is_silent() {
+        let metrics = Arc::new(Metrics::default());
+        let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
+        let address = listener.local_addr().unwrap();
+        let mut connections = incoming(listener, metrics.clone());
+        let mut peer = TcpStream::connect(address).await.unwrap();
+        let mut connection = connections.next().await.unwrap().unwrap();
+        peer.write_all(b"hello").await.unwrap();
+        let mut bytes = [0; 5];
+        connection.read_exact(&mut bytes).await.unwrap();
+        assert_eq!(connection.received.get(), 5);
+        let begun = Instant::now();
+        let error = connection.read_u8().await.unwrap_err();
+        assert_eq!(error.kind(), io::ErrorKind::TimedOut);
+        assert!(begun.elapsed() >= SILENCE - Duration::from_secs(1));
+        assert_eq!(metrics.connections.get(), 1);
+        drop(connection);
+        assert_eq!(metrics.connections.get(), 0);
     }
 }

@@ -222,3 +222,69 @@ fn not_held(what: &str, id: Id) -> ServiceError {
     let message = format!("{what} {id} is not held (any more): upload it again");
     ServiceError::new(ErrorCode::NotFound, message)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn geometry(number: u64) -> HeldGeometry {
+        HeldGeometry {
+            id: super::super::identity::solve_id(0, number),
+            scene: Scene::default(),
+            inspection: Inspection::default(),
+        }
+    }
+
+    fn keep(scenes: &Scenes, number: u64, bytes: u64) -> Result<HeldScene, ServiceError> {
+        let geometry = geometry(number);
+        let id = geometry.id;
+        scenes.keep_geometry(geometry, scenes.reserve(bytes)?);
+        let light = Light {
+            bands: Vec::new(),
+            sources: Vec::new(),
+        };
+        scenes.keep_scene(id, light)
+    }
+
+    #[test]
+    fn what_was_not_used_for_longest_goes_first() {
+        let scenes = Scenes::new(30_000);
+        let [a, b] = [1, 2].map(|k| keep(&scenes, k, 10_000).unwrap().id);
+        scenes.scene(a).unwrap();
+        let c = keep(&scenes, 3, 10_000).unwrap().id;
+        assert!(scenes.scene(a).is_ok() && scenes.scene(c).is_ok());
+        assert_eq!(scenes.scene(b).unwrap_err().code, ErrorCode::NotFound);
+        assert_eq!(
+            (scenes.count(), scenes.bytes()),
+            (2, 2 * (10_000 + SCENE_BYTES))
+        );
+    }
+
+    #[test]
+    fn what_is_in_use_counts_until_it_is_not() {
+        let scenes = Scenes::new(30_000);
+        let used = keep(&scenes, 1, 20_000).unwrap();
+        let refused = keep(&scenes, 2, 20_000).unwrap_err();
+        assert_eq!(refused.code, ErrorCode::Exhausted);
+        assert!(refused.message.contains("30000 bytes"), "{refused}");
+        drop(used);
+        assert!(keep(&scenes, 2, 20_000).is_ok());
+    }
+
+    #[test]
+    fn what_could_never_fit_drives_nothing_out() {
+        let scenes = Scenes::new(30_000);
+        let id = keep(&scenes, 1, 20_000).unwrap().id;
+        assert!(scenes.reserve(30_001).is_err());
+        assert!(scenes.scene(id).is_ok());
+    }
+
+    #[test]
+    fn the_same_content_is_held_once() {
+        let scenes = Scenes::new(30_000);
+        let first = keep(&scenes, 1, 10_000).unwrap();
+        let again = keep(&scenes, 1, 10_000).unwrap();
+        assert_eq!(first.id, again.id);
+        assert_eq!((scenes.count(), scenes.bytes()), (1, 10_000 + SCENE_BYTES));
+    }
+}
