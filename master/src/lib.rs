@@ -18,4 +18,5 @@ pub mod run;
 pub mod service;
 pub mod solution;
 pub mod solver;
+pub mod store;
 pub mod world;

@@ -7,7 +7,9 @@ use thiserror::Error;
 
 use crate::cluster::Cluster;
 use crate::direct::{Direct, direct_light};
-use crate::exchange::{BlockOf, Exchange, ExchangeError, Outlook, Traced, trace_here};
+use crate::exchange::{
+    BlockOf, Exchange, ExchangeError, JobCounts, Outlook, Sampling, Traced, trace_here, trace_kept,
+};
 use crate::far_field::closure::{FarRows, from_layers};
 use crate::output::progress::{Cancelled, Progress};
 use crate::output::resources::Stopwatch;
@@ -15,6 +17,7 @@ use crate::plan::Plan;
 use crate::results::Parts;
 use crate::solution::Solution;
 use crate::solver::{Irradiance, SolveError, System};
+use crate::store::Store;
 use crate::world::{World, outer_soil_radiosity_W_m2};
 
 /// What a solve gives, and what it took.
@@ -35,6 +38,8 @@ pub struct Counters {
     pub direct_lines: u64,
     /// Lines, segments, rays and row entries of the exchange.
     pub exchange: Traced,
+    /// Jobs of the exchange; `None` where another master had them done.
+    pub jobs: Option<JobCounts>,
     /// Passes of the solver over all rows.
     pub passes: u32,
 }
@@ -58,6 +63,8 @@ pub enum RunError {
 pub struct Means<'a> {
     /// Workers that trace the exchange; without them it is traced here.
     pub workers: Option<&'a Cluster>,
+    /// Results of jobs that are kept from solve to solve.
+    pub kept: Option<&'a Store>,
 }
 
 /// Solves a problem as planned in this process, or stops at the end of a step if `progress` is told so.
@@ -85,7 +92,8 @@ pub fn solve_with(
         let tracing = plan.sampling.as_ref().zip(means.workers);
         let tracing = tracing.map(|(sampling, workers)| {
             let world = &world;
-            scope.spawn(move || workers.trace(&problem.scene, world, sampling, progress))
+            scope
+                .spawn(move || workers.trace(&problem.scene, world, sampling, means.kept, progress))
         });
         // the stage that is shown is the workers', where there are any
         let shown = tracing.is_none();
@@ -97,12 +105,7 @@ pub fn solve_with(
         let exchange = match (tracing, &plan.sampling) {
             (Some(tracing), _) => tracing.join().unwrap_or_else(|panic| resume_unwind(panic)),
             (None, Some(sampling)) if meanwhile.is_ok() => {
-                progress.stage("exchange", u64::from(sampling.batches));
-                let whole = [BlockOf::whole(&world)];
-                trace_here(&problem.scene, &world, &whole, sampling, || {
-                    progress.inc(1);
-                    progress.check()
-                })
+                here(problem, &world, sampling, means.kept, progress)
             }
             _ => Ok(Exchange::default()),
         };
@@ -147,9 +150,29 @@ pub fn solve_with(
         elements: world.elements.len(),
         direct_lines: direct.lines,
         exchange: exchange.counters,
+        jobs: Some(exchange.jobs),
         passes: irradiance.passes,
     };
     Ok(Finished { solution, counters })
+}
+
+/// The exchange, traced in this process.
+fn here(
+    problem: &Problem,
+    world: &World,
+    sampling: &Sampling,
+    kept: Option<&Store>,
+    progress: &Progress,
+) -> Result<Exchange, ExchangeError> {
+    if let Some(kept) = kept {
+        return trace_kept(&problem.scene, world, sampling, kept, progress);
+    }
+    progress.stage("exchange", u64::from(sampling.batches));
+    let whole = [BlockOf::whole(world)];
+    trace_here(&problem.scene, world, &whole, sampling, || {
+        progress.inc(1);
+        progress.check()
+    })
 }
 
 /// What is computed while workers trace.

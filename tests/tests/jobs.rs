@@ -8,8 +8,8 @@ use nestrad_common::generate::{Generated, Maize, Stand};
 use nestrad_common::options::Diameter;
 use nestrad_common::problem::Problem;
 use nestrad_master::exchange::{
-    Assembly, BlockOf, Exchange, ExchangeError, JobOf, JobRows, Sampling, SmallestWorker, batches,
-    block_message, demand, partition, split, trace_here,
+    Assembly, BlockOf, Exchange, ExchangeError, JobCounts, JobOf, JobRows, Sampling,
+    SmallestWorker, batches, block_message, demand, partition, split, trace_here,
 };
 use nestrad_master::plan::Settings;
 use nestrad_master::world::World;
@@ -75,7 +75,7 @@ fn by_jobs(
             assembly.put(k, rows).unwrap();
         }
     }
-    assembly.finish().unwrap()
+    assembly.finish(JobCounts::default()).unwrap()
 }
 
 #[test]

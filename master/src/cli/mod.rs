@@ -8,6 +8,7 @@ mod record;
 mod remote;
 mod serve;
 mod solve;
+mod state;
 mod status;
 mod workers;
 

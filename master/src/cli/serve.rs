@@ -13,6 +13,7 @@ use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
 use super::flags::positive;
+use super::state::StateFlags;
 use super::workers::lease;
 
 /// Serve solves to clients over gRPC, until told to stop
@@ -32,6 +33,9 @@ pub(crate) struct ServeArgs {
     /// A worker that is silent for so long loses its jobs to others, seconds
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
+
+    #[command(flatten)]
+    state: StateFlags,
 
     #[command(flatten)]
     limits: LimitFlags,
@@ -125,7 +129,9 @@ impl ServeArgs {
             }
         };
         let workers = cluster::Limits::default().with_lease(self.lease);
-        let service = Service::new(self.limits.limits(), workers, self.limits.threads.into())?;
+        let kept = self.state.open()?;
+        let threads = self.limits.threads.into();
+        let service = Service::new(self.limits.limits(), workers, kept, threads)?;
         let listener = bind(self.listen).await?;
         if let Some(address) = self.metrics {
             let listener = bind(address).await?;

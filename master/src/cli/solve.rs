@@ -28,6 +28,7 @@ use super::console::{self, Notes};
 use super::flags::{SceneFlags, positive};
 use super::record::Record;
 use super::remote::MasterFlags;
+use super::state::StateFlags;
 use super::workers::{Crew, WorkersFlags};
 
 /// Compute the light that every organ, triangle and soil cell of a canopy gets
@@ -47,6 +48,9 @@ pub(crate) struct SolveArgs {
 
     #[command(flatten)]
     workers: WorkersFlags,
+
+    #[command(flatten)]
+    state: StateFlags,
 
     #[command(flatten)]
     results: ResultFlags,
@@ -139,6 +143,7 @@ impl SolveArgs {
             },
             inputs,
             workers: self.workers,
+            state: self.state,
             out: self.results.out,
             place: self.place,
         };
@@ -168,6 +173,7 @@ struct Task {
     inputs: Inputs,
     settings: Settings,
     workers: WorkersFlags,
+    state: StateFlags,
     out: PathBuf,
     place: MasterFlags,
     notes: Notes,
@@ -210,13 +216,21 @@ impl Task {
             self.notes.say("plan", line);
         }
         let progress = Progress::new(self.notes.quiet);
+        let kept = self.state.open()?;
         let crew = self.workers.crew(self.settings.memory_GiB, self.notes)?;
         let means = Means {
             workers: crew.as_ref().map(Crew::cluster),
+            kept: kept.as_ref(),
         };
         let finished = run::solve_with(problem, &plan, means, &progress, watch)?;
         let Finished { solution, counters } = finished;
         drop(crew);
+        if let Some(kept) = kept {
+            kept.close();
+            if let Some(warning) = kept.warning() {
+                self.notes.say("warning", &warning);
+            }
+        }
         Ok(Computed {
             solution,
             plan: Box::new(plan),
@@ -315,6 +329,7 @@ fn elsewhere(remote: Remote) -> Result<Computed> {
                 rays: summary.rays,
                 row_entries: summary.row_entries,
             },
+            jobs: None,
             passes: summary.passes,
         },
         stages: stages.collect(),

@@ -14,10 +14,11 @@ use rayon::prelude::*;
 use super::scheduler::{BlockId, BlockSpec, Id, JobSpec, Outcome};
 use super::{Cluster, State};
 use crate::exchange::{
-    Assembly, BlockOf, Exchange, ExchangeError, JobOf, JobRows, Sampling, SmallestWorker, batches,
-    block_message, demand, partition, split,
+    Assembly, BlockOf, Exchange, ExchangeError, JobCounts, JobOf, JobRows, Sampling,
+    SmallestWorker, batches, block_message, demand, partition, split,
 };
 use crate::output::progress::Progress;
+use crate::store::{self, Key, Store};
 use crate::world::World;
 
 /// How long a thread sleeps before it looks whether it is still wanted.
@@ -64,12 +65,13 @@ impl State {
 }
 
 impl Cluster {
-    /// Has all batches traced by the workers. Waits for the first of them, which may come at any time.
+    /// Has all batches traced by the workers, but for what is kept from before. Waits for the first of them, which may come at any time.
     pub fn trace(
         &self,
         scene: &Scene,
         world: &World,
         sampling: &Sampling,
+        kept: Option<&Store>,
         progress: &Progress,
     ) -> Result<Exchange, ExchangeError> {
         progress.stage("waiting for a worker", 0);
@@ -87,14 +89,42 @@ impl Cluster {
         let jobs: Arc<[JobOf]> = jobs.into();
         let mut assembly = Assembly::new(world, &blocks, jobs.clone(), sampling.batches);
         progress.stage("exchange", jobs.len() as u64);
-        let running = self.begin(sent, batches, jobs.clone(), world);
-        for _ in 0..jobs.len() {
+        let keys: Vec<Key> = match kept {
+            Some(_) => jobs
+                .iter()
+                .map(|job| {
+                    let batch = job.message(&batches[job.batch as usize]);
+                    store::key(&sent[job.block].id, &batch)
+                })
+                .collect(),
+            None => Vec::new(),
+        };
+        let mut known = Vec::new();
+        if let Some(kept) = kept {
+            for (number, (job, key)) in jobs.iter().zip(&keys).enumerate() {
+                let rows = u64::from(sent[job.block].rows);
+                if let Some(rows) = kept.get(key, rows, world.ends.len() as u32) {
+                    self.0.compute.install(|| assembly.put(number, rows))?;
+                    progress.inc(1);
+                    known.push(number);
+                }
+            }
+        }
+        let counts = JobCounts {
+            traced: (jobs.len() - known.len()) as u64,
+            kept: known.len() as u64,
+        };
+        let running = self.begin(sent, batches, jobs.clone(), &known, world);
+        for _ in 0..counts.traced {
             let (job, rows) = running.next(progress)?;
+            if let Some(kept) = kept {
+                kept.put(keys[job], &rows);
+            }
             self.0.compute.install(|| assembly.put(job, rows))?;
             progress.inc(1);
         }
         drop(running);
-        let exchange = self.0.compute.install(|| assembly.finish());
+        let exchange = self.0.compute.install(|| assembly.finish(counts));
         exchange.ok_or_else(|| ExchangeError::Failed("jobs without result".to_owned()))
     }
 
@@ -125,6 +155,7 @@ impl Cluster {
         blocks: Vec<SentBlock>,
         batches: Vec<v1::Batch>,
         jobs: Arc<[JobOf]>,
+        known: &[usize],
         world: &World,
     ) -> Running<'_> {
         let (sender, results) = mpsc::channel();
@@ -140,6 +171,9 @@ impl Cluster {
         let id = state
             .scheduler
             .begin(block_specs.collect(), job_specs.collect());
+        for &job in known {
+            state.scheduler.known(id, job);
+        }
         let open = Open {
             blocks: blocks.into(),
             batches: batches.into(),

@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use super::jobs::BlockOf;
 use super::rows::{BatchRows, put_together};
 use super::split::JobOf;
-use super::{Exchange, ExchangeError, Traced};
+use super::{Exchange, ExchangeError, JobCounts, Traced};
 use crate::world::World;
 
 /// The result of a job, packed and checked.
@@ -111,8 +111,8 @@ impl<'a> Assembly<'a> {
     }
 
     /// The exchange, once all jobs are in; `None` before.
-    pub fn finish(self) -> Option<Exchange> {
+    pub fn finish(self, jobs: JobCounts) -> Option<Exchange> {
         let batches: Option<Vec<BatchRows>> = self.batches.into_iter().collect();
-        Some(Exchange::of_batches(batches?, self.counters))
+        Some(Exchange::of_batches(batches?, self.counters, jobs))
     }
 }

@@ -3,6 +3,7 @@
 
 mod assembly;
 mod jobs;
+mod kept;
 mod outlook;
 mod partition;
 mod rows;
@@ -22,6 +23,7 @@ use crate::output::progress::Cancelled;
 use crate::world::World;
 pub use assembly::{Assembly, JobRows};
 pub use jobs::{BlockOf, batch_message, batch_of_lines, block_message, world_message};
+pub use kept::trace_kept;
 pub use outlook::Outlook;
 pub use partition::{SmallestWorker, partition};
 use rows::put_together;
@@ -97,18 +99,33 @@ pub struct Exchange {
     pub halves: [HalfRows; 2],
     /// Lines, segments between hits, rays.
     pub counters: Traced,
+    /// Jobs that it took.
+    pub jobs: JobCounts,
+}
+
+/// Jobs by where their results come from.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, serde::Serialize)]
+pub struct JobCounts {
+    /// Traced for this solve.
+    pub traced: u64,
+    /// Kept from an earlier one.
+    pub kept: u64,
 }
 
 impl Exchange {
     /// Joins all batches.
-    fn of_batches(mut batches: Vec<BatchRows>, counters: Traced) -> Self {
+    fn of_batches(mut batches: Vec<BatchRows>, counters: Traced, jobs: JobCounts) -> Self {
         let mut halves = [HalfRows::default(), HalfRows::default()];
         // each half's batches are freed before the other half is joined
         let second = batches.split_off(batches.len() / 2);
         halves[0] = HalfRows::join(&batches);
         drop(batches);
         halves[1] = HalfRows::join(&second);
-        Self { halves, counters }
+        Self {
+            halves,
+            counters,
+            jobs,
+        }
     }
 }
 
@@ -209,5 +226,9 @@ pub fn trace_here(
         }
         batches.push(put_together(world, index as u32, parts)?);
     }
-    Ok(Exchange::of_batches(batches, counters))
+    let jobs = JobCounts {
+        traced: u64::from(sampling.batches) * blocks.len() as u64,
+        kept: 0,
+    };
+    Ok(Exchange::of_batches(batches, counters, jobs))
 }

@@ -11,21 +11,25 @@ use super::metrics::Metrics;
 use super::outcome::Outcome;
 use super::scenes::HeldScene;
 use super::solves::{Job, Solves, State};
-use crate::cluster::Cluster;
 use crate::output::progress::Cancelled;
 use crate::output::resources::Stopwatch;
 use crate::plan::{Plan, PlanError};
 use crate::run::{self, Means, RunError};
 
 /// Solves what is in the queue, one solve after the other, until the master stops.
-pub(super) fn work(solves: &Solves, pool: &ThreadPool, workers: &Cluster, metrics: &Metrics) {
+pub(super) fn work<'a>(
+    solves: &Solves,
+    pool: &ThreadPool,
+    means: impl Fn() -> Means<'a> + Sync,
+    metrics: &Metrics,
+) {
     while let Some(job) = solves.next() {
         let span = tracing::info_span!("solve", id = %job.id);
         let _entered = span.enter();
         tracing::info!(triangles = job.triangles, bands = job.bands, "begins");
         // a fault of the program ends the solve, not the master
         let solved = catch_unwind(AssertUnwindSafe(|| {
-            pool.install(|| solve(&job, workers, metrics))
+            pool.install(|| solve(&job, means(), metrics))
         }));
         let state = solved.unwrap_or_else(|_| State::Failed("internal fault".to_owned()));
         let state = match state {
@@ -44,11 +48,11 @@ pub(super) fn work(solves: &Solves, pool: &ThreadPool, workers: &Cluster, metric
     }
 }
 
-fn solve(job: &Job, workers: &Cluster, metrics: &Metrics) -> State {
+fn solve(job: &Job, means: Means, metrics: &Metrics) -> State {
     let Some(scene) = job.take_scene() else {
         return State::Cancelled;
     };
-    match outcome(job, workers, &scene) {
+    match outcome(job, means, &scene) {
         Ok(outcome) => {
             metrics.solved(&outcome.summary);
             State::Finished(Arc::new(outcome))
@@ -82,7 +86,7 @@ fn chain(error: &dyn Error) -> String {
     text
 }
 
-fn outcome(job: &Job, workers: &Cluster, scene: &HeldScene) -> Result<Outcome, Fault> {
+fn outcome(job: &Job, means: Means, scene: &HeldScene) -> Result<Outcome, Fault> {
     let mut watch = Stopwatch::start();
     job.progress.stage("plan", 0);
     let problem = scene.problem();
@@ -90,10 +94,6 @@ fn outcome(job: &Job, workers: &Cluster, scene: &HeldScene) -> Result<Outcome, F
     job.set_plan(&plan.reasons);
     watch.lap("plan");
     job.progress.check()?;
-    // a master without workers computes by itself
-    let means = Means {
-        workers: workers.has_workers().then_some(workers),
-    };
     let finished = run::solve_with(&problem, &plan, means, &job.progress, &mut watch)?;
     let usage = watch.usage();
     Ok(Outcome::new(scene, &plan, finished, watch.stages(), usage)?)

@@ -25,6 +25,8 @@ use super::rpc::{Rpc, UPLOADS};
 use super::scenes::Scenes;
 use super::solves::{Solves, State};
 use crate::cluster::{self, Cluster};
+use crate::run::Means;
+use crate::store::Store;
 
 /// Time for clients to come for what has just finished, and to hang up, when the master stops.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -38,6 +40,7 @@ pub struct Service {
     metrics: Arc<Metrics>,
     pool: Arc<ThreadPool>,
     workers: Cluster,
+    kept: Option<Store>,
     started: Instant,
 }
 
@@ -67,6 +70,7 @@ impl Service {
     pub fn new(
         limits: Limits,
         workers: cluster::Limits,
+        kept: Option<Store>,
         threads: usize,
     ) -> Result<Self, ServeError> {
         let named = |k| format!("compute-{k}");
@@ -81,6 +85,7 @@ impl Service {
             metrics: Arc::default(),
             pool: Arc::new(pool),
             workers: Cluster::start(workers, threads)?,
+            kept,
             started: Instant::now(),
         })
     }
@@ -145,11 +150,19 @@ impl Service {
             let this = self.clone();
             std::thread::Builder::new()
                 .name(format!("solve-{k}"))
-                .spawn(move || {
-                    compute::work(&this.solves, &this.pool, &this.workers, &this.metrics)
-                })?;
+                .spawn(move || this.compute())?;
         }
         Ok(())
+    }
+
+    /// Solves one after the other, until the master stops.
+    fn compute(&self) {
+        // a master without workers computes by itself
+        let means = || Means {
+            workers: self.workers.has_workers().then_some(&self.workers),
+            kept: self.kept.as_ref(),
+        };
+        compute::work(&self.solves, &self.pool, means, &self.metrics);
     }
 
     /// Takes on nothing new, and waits for the rest.
@@ -170,6 +183,9 @@ impl Service {
             }
         }
         self.workers.close();
+        if let Some(kept) = &self.kept {
+            kept.close();
+        }
         // results that nobody comes for are lost
         let quiet = until(|| self.solves.is_quiet(FAREWELL));
         let _ = timeout(limit + FAREWELL, quiet).await;
