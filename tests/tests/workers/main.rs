@@ -4,6 +4,7 @@
 
 mod bits;
 mod faults;
+mod kept;
 mod masters;
 mod memory;
 mod partition;
