@@ -70,7 +70,7 @@ fn text(status: &v1::StatusResponse) -> String {
         line(
             "worker",
             format!(
-                "{}: {} threads, {} GiB; {} jobs leased, {} done, {} lost; heard of {} ago",
+                "{}: {} threads, {:.1} GiB; {} jobs leased, {} done, {} lost; heard of {} ago",
                 printable(&worker.name),
                 worker.threads,
                 worker.memory_gi_b,
