@@ -1,9 +1,13 @@
 //! Masters that stop, or are stopped.
 
+use nestrad_proto::channel::{Credentials, connect};
 use nestrad_proto::v1;
 use nestrad_tests::calls::{block_on, client};
 use nestrad_tests::desk::Desk;
 use nestrad_tests::processes::{Master, nestrad, said, signal, until, wait_for};
+use tonic_health::pb::HealthCheckRequest;
+use tonic_health::pb::health_check_response::ServingStatus;
+use tonic_health::pb::health_client::HealthClient;
 
 fn runs(master: &Master) -> bool {
     let solves = block_on(async {
@@ -68,6 +72,16 @@ fn a_master_that_is_stopped_takes_nothing_new_and_says_so() {
             .unwrap_err()
     });
     assert_eq!(refused.code(), tonic::Code::Unavailable);
+    let health = block_on(async {
+        let channel = connect(&master.url(), &Credentials::default()).unwrap();
+        let request = HealthCheckRequest::default();
+        HealthClient::new(channel)
+            .check(request)
+            .await
+            .unwrap()
+            .into_inner()
+    });
+    assert_eq!(health.status(), ServingStatus::NotServing);
     assert_eq!(refused.message(), "the master is about to stop");
     signal(child.id(), "TERM");
     assert_eq!(wait_for(child).status.code(), Some(1));
