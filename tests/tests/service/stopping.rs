@@ -111,19 +111,32 @@ fn a_time_to_drain_that_is_over_cancels() {
     assert!(!desk.path("out").exists());
 }
 
-#[test]
-fn a_master_that_is_killed_and_started_again_gives_the_same_bytes() {
+/// A master that is killed in the middle of a solve, and started again with the same arguments.
+fn killed_and_started_again(args: &[&str]) {
     let desk = Desk::new();
     desk.maize("maize", "1");
     let mut again = None;
-    let (done, said) = solve_while(&desk, Master::start(&[]), |master| {
+    let (done, said) = solve_while(&desk, Master::start(args), |master| {
         let address = master.address.to_string();
         master.kill();
-        again = Some(Master::start_at(&address, &[]));
+        again = Some(Master::start_at(&address, args));
     });
     assert!(done, "{said}");
     assert!(said.contains("the master is away"), "{said}");
     assert!(desk.tables("here") == desk.tables("there"));
+}
+
+#[test]
+fn a_master_that_is_killed_and_started_again_gives_the_same_bytes() {
+    killed_and_started_again(&[]);
+}
+
+#[test]
+fn a_master_that_is_killed_goes_on_from_its_state_to_the_same_bytes() {
+    let state = Desk::new();
+    let folder = state.path("state").display().to_string();
+    killed_and_started_again(&["--state", &folder]);
+    assert!(state.path("state").read_dir().unwrap().next().is_some());
 }
 
 #[test]
