@@ -21,6 +21,8 @@ pub(crate) struct Job {
     pub(crate) took_s: f64,
     /// Packed rows, bytes.
     pub(crate) bytes: u64,
+    /// It casts rays, for which a tree is built.
+    pub(crate) rays: bool,
 }
 
 /// A recorded solve.
@@ -91,6 +93,7 @@ impl Recorded {
                 cost_s: job.cost_s,
                 took_s: begun.elapsed().as_secs_f64(),
                 bytes: rows.packed.len() as u64,
+                rays: batch.rays.is_some(),
             }
         };
         let (mut jobs, mut last): (Vec<Job>, Option<(bool, Job)>) = (Vec::new(), None);
@@ -122,12 +125,16 @@ impl Recorded {
         }
     }
 
-    /// The same with so many times the directions.
+    /// The same with so many times the directions. Rays do not grow with them: they stand in for lines
+    /// where these are few.
     #[must_use]
     pub(crate) fn times(&self, times: u32) -> Self {
-        let jobs = std::iter::repeat_n(&self.jobs, times as usize).flatten();
+        let copies = |job: &Job| {
+            let copies = if job.rays { 1 } else { times as usize };
+            std::iter::repeat_n(*job, copies)
+        };
         Self {
-            jobs: jobs.copied().collect(),
+            jobs: self.jobs.iter().flat_map(copies).collect(),
             ..self.clone()
         }
     }

@@ -45,6 +45,8 @@ enum What {
 struct Worker {
     id: Id,
     ready: bool,
+    /// It has built the tree for rays.
+    tree: bool,
     computing: Option<Leased>,
     /// What is computed waits for the result before it to be through.
     waits: bool,
@@ -134,6 +136,7 @@ pub(crate) fn simulate(recorded: &Recorded, workers: u32, network: Network) -> R
                 },
             ),
             ready: network.blocks_held,
+            tree: false,
             computing: None,
             waits: false,
             returning: None,
@@ -162,7 +165,11 @@ pub(crate) fn simulate(recorded: &Recorded, workers: u32, network: Network) -> R
                 if !worker.ready {
                     worker.ready = true;
                     let sent = recorded.block_bytes as f64 / network.bytes_per_s;
-                    begins_s = link.send(begins_s, sent) + recorded.ready_s[1];
+                    begins_s = link.send(begins_s, sent) + recorded.ready_s[0];
+                }
+                if recorded.jobs[leased.job].rays && !worker.tree {
+                    worker.tree = true;
+                    begins_s += recorded.ready_s[1] - recorded.ready_s[0];
                 }
                 worker.computing = Some(leased);
                 let takes_s = recorded.jobs[leased.job].took_s;
