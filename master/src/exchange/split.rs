@@ -207,14 +207,8 @@ impl Sizes {
         }
         let parts = (rays_s / JOB_S).ceil().clamp(1.0, MOST_PARTS) as u32;
         let end = batch.lines.len();
-        let part = |p| {
-            job(
-                end..end,
-                (0, 1),
-                Some((p, parts)),
-                rays_s / f64::from(parts),
-            )
-        };
+        let part_s = rays_s / f64::from(parts) + TREE_S * self.demand.triangles as f64;
+        let part = |p| job(end..end, (0, 1), Some((p, parts)), part_s);
         jobs.extend((0..parts).map(part));
     }
 }
