@@ -11,6 +11,7 @@ mod probe;
 mod source;
 
 use nestrad_common::directions::{Purpose, stream};
+use nestrad_common::lattice::{Extent, Lattice};
 use nestrad_common::light::Source;
 use nestrad_common::problem::Problem;
 use nestrad_worker::BlockFault;
@@ -111,7 +112,12 @@ fn empty(problem: &Problem, world: &World) -> Direct {
 /// The variance of an organ's light goes with `I² a^(3/2)` (I: irradiance perpendicular to the
 /// source, a: cross-section; the variance of an area measured by a lattice of points, Gundersen &
 /// Jensen 1987), the cost with `1/a`; the least variance for a given cost has `a ~ I^(-4/5)`.
-pub fn spread_effort(problem: &Problem, finest_m2: f64, ground_area_m2: f64) -> Vec<f64> {
+pub fn spread_effort(
+    problem: &Problem,
+    extent: &Extent,
+    finest_m2: f64,
+    ground_area_m2: f64,
+) -> Vec<f64> {
     let intensity: Vec<f64> = problem
         .sources
         .iter()
@@ -125,14 +131,24 @@ pub fn spread_effort(problem: &Problem, finest_m2: f64, ground_area_m2: f64) -> 
         .map(|(source, i)| {
             let fewest = ground_area_m2 * -source.direction.z / FEWEST_POINTS;
             let part = (i / strongest).powf(-0.8).min(COARSEST);
-            (finest_m2 * part).min(fewest).max(f64::MIN_POSITIVE)
+            let area = (finest_m2 * part).min(fewest).max(f64::MIN_POSITIVE);
+            // low light drags the box of an open scene far out
+            let most = MOST_TIMES * (ground_area_m2 / finest_m2).max(FEWEST_POINTS);
+            area * (points_of(source, extent, area) / most).max(1.0)
         })
         .collect();
-    let points = |(source, area): (&Source, &f64)| ground_area_m2 * -source.direction.z / area;
+    let points = |(source, area): (&Source, &f64)| points_of(source, extent, *area);
     let all: f64 = problem.sources.iter().zip(&wanted).map(points).sum();
     let too_many = (all / MOST_POINTS).max(1.0);
     wanted.iter().map(|area| area * too_many).collect()
 }
+
+fn points_of(source: &Source, extent: &Extent, line_area_m2: f64) -> f64 {
+    Lattice::new(-source.direction, extent, line_area_m2, [0.0, 0.0, 0.5]).lines() as f64
+}
+
+/// No source is drawn with more points than this many times those that the strongest has on the ground.
+const MOST_TIMES: f64 = 8.0;
 
 /// No source is drawn with lines coarser than this many times those of the strongest.
 const COARSEST: f64 = 4.0;

@@ -11,7 +11,7 @@ use super::{PlanError, Scale, Settings};
 const LEAST_ACCURACY_PERCENT: f64 = 0.01;
 
 /// Most copies of the pattern that one triangle may reach into.
-const MOST_PATTERNS: f64 = 1e4;
+const MOST_PATTERNS: f64 = 1e3;
 
 /// A step in height may be this part of a triangle.
 const FINEST_STEP: f64 = 1e-3;

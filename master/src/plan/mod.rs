@@ -18,7 +18,7 @@ use crate::direct;
 use crate::exchange::Sampling;
 use crate::far_field::closure::Resolution;
 use crate::solver::{HALF_BATCHES, Tolerance};
-use crate::world::World;
+use crate::world::{World, extent_of};
 pub use memory::Memory;
 pub use scale::Scale;
 
@@ -250,7 +250,12 @@ impl Plan {
 
     /// Cross-sections of the lines of each source, m².
     pub fn direct_line_areas_m2(&self, problem: &Problem) -> Vec<f64> {
-        direct::spread_effort(problem, self.direct_line_area_m2, self.scale.ground_area_m2)
+        direct::spread_effort(
+            problem,
+            &extent_of(&problem.scene),
+            self.direct_line_area_m2,
+            self.scale.ground_area_m2,
+        )
     }
 }
 

@@ -40,7 +40,7 @@ pub(super) fn changed(
 }
 
 /// An error with all its causes.
-pub(super) fn refusal(error: impl std::error::Error) -> String {
+pub fn refusal(error: impl std::error::Error) -> String {
     let mut text = error.to_string();
     let mut cause = error.source();
     while let Some(error) = cause {
@@ -59,7 +59,7 @@ pub(super) fn loaded(inputs: &Inputs, folder: &Path) -> Result<Problem, String> 
 }
 
 /// What must hold of any solution.
-fn sound(solution: &Solution, tolerance: f64) -> Result<(), String> {
+pub fn sound(solution: &Solution, tolerance: f64) -> Result<(), String> {
     let bands = solution.balance.len();
     let finite = |what: &str, value: f64| {
         if value.is_finite() && value >= 0.0 {

@@ -123,6 +123,28 @@ pub(super) fn cases() -> Vec<Case> {
             refused(outcome, &["did not converge", "band B"])
         },
     ));
+    for (name, n, scattered, soil) in [
+        (
+            "20 plates, rho + tau = 0.999999, black soil",
+            20,
+            0.999_999,
+            0.0,
+        ),
+        ("50 plates, rho + tau = 1, black soil", 50, 1.0, 0.0),
+        ("50 plates, rho + tau = 1, white soil", 50, 1.0, 1.0),
+    ] {
+        let leaf = same(0.5 * scattered, 0.5 * scattered);
+        let albedo = stack(n, leaf, soil).albedo;
+        cases.push(Case::new(
+            AXIS,
+            name,
+            format!(
+                "adding of {n} plates: albedo {albedo:.7}, in at most {} passes",
+                most_passes(n)
+            ),
+            move || deep(n, leaf, soil),
+        ));
+    }
     cases.push(Case::new(
         AXIS,
         "64 bands from black to white in one solve",
@@ -130,6 +152,26 @@ pub(super) fn cases() -> Vec<Case> {
         sixty_four_bands,
     ));
     cases
+}
+
+/// Passes over all rows that a solve may take, however little is absorbed: of so many plates.
+fn most_passes(plates: usize) -> u32 {
+    if plates <= 20 { 60 } else { 150 }
+}
+
+fn deep(n: usize, leaf: LeafOptics, soil_albedo: f64) -> Verdict {
+    let scenery = plates(n, 0.1, leaf, soil_albedo);
+    let finished = changed(&scenery.problem, &coarse(), |plan| {
+        evenly(plan);
+        plan.tolerance.absorbed = 1e-6;
+    })?;
+    let passes = finished.counters.passes;
+    if passes > most_passes(n) {
+        return Err(format!("{passes} passes"));
+    }
+    let albedo = shares(&finished.solution, 0).up;
+    let what = format!("{passes} passes, albedo");
+    near(&what, albedo, stack(n, leaf, soil_albedo).albedo, BOUND)
 }
 
 fn sixty_four_bands() -> Verdict {
