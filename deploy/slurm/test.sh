@@ -39,14 +39,18 @@ within() {
 own_munged=
 down() {
     scancel --user=root 2>/dev/null || true
+    local pid pids=()
     for pidfile in "$work"/run/*.pid $own_munged; do
-        if [ -e "$pidfile" ]; then kill "$(cat "$pidfile")" 2>/dev/null || true; fi
+        if [ -e "$pidfile" ]; then pids+=("$(cat "$pidfile")"); fi
     done
-    for port in 16817 17001 17002 17003; do
+    for pid in "${pids[@]}"; do kill "$pid" 2>/dev/null || true; done
+    # what has ended has no program any more, though nobody may collect it
+    for pid in "${pids[@]}"; do
         for _ in $(seq 50); do
-            listening $port || break
+            [ -e "/proc/$pid/exe" ] || continue 2
             sleep 0.2
         done
+        kill -9 "$pid" 2>/dev/null || true
     done
     rm -rf "$work"
 }
@@ -138,19 +142,40 @@ within 60 'end of the job' ended "$job"
 cleaned_up
 say 'a solve that fails: its exit code'
 
+# workers_of JOB NODE: the workers' processes; NODE may be a pattern
+workers_of() {
+    local pid
+    for pid in $(pgrep -x nestrad-worker); do
+        if grep -qzx "SLURM_JOB_ID=$1" "/proc/$pid/environ" && grep -qzx "SLURMD_NODENAME=$2" "/proc/$pid/environ"; then
+            echo "$pid"
+        fi
+    done
+}
+parent_of() { awk '/^PPid/ { print $2 }' "/proc/$1/status"; }
+# computing NAME: both workers of the job have got what they need to trace
+computing() { [ "$(grep -cs 'block is ready' "$1.out")" = 2 ]; }
+
+within 20 'three idle nodes' idle 3
+job=$(submit deserted scene/scene.toml deserted "${options[@]}")
+within 60 'two workers at work' computing deserted
+mapfile -t lost < <(workers_of "$job" 'n[23]')
+[ "${#lost[@]}" -eq 2 ] || fail "${#lost[@]} workers, not two"
+kill -9 "${lost[@]}"
+within 60 'end of the job without workers' ended "$job"
+[ "$(field "$job" ExitCode)" = 1:0 ] || fail "the job without workers ended with $(field "$job" ExitCode), not 1"
+grep -q 'all workers are gone' deserted.out || fail 'the job does not say that its workers are gone'
+[ ! -e deserted ] || fail 'the job without workers left results'
+cleaned_up
+say 'all workers lost: an error, and no waiting'
+
 within 20 'three idle nodes' idle 3
 job=$(submit losing scene/scene.toml losing "${options[@]}")
-computing() { [ "$(grep -cs 'block is ready' losing.out)" = 2 ]; }
-within 60 'two workers at work' computing
-# everything of node n3 at once: its worker, the step's daemon above it, and the node's daemon
-killed=0
-for worker in $(pgrep -x nestrad-worker); do
-    if grep -qzx "SLURM_JOB_ID=$job" "/proc/$worker/environ" && grep -qzx SLURMD_NODENAME=n3 "/proc/$worker/environ"; then
-        kill -9 "$worker" "$(awk '/^PPid/ { print $2 }' "/proc/$worker/status")" "$(cat run/slurmd.n3.pid)"
-        killed=$((killed + 1))
-    fi
-done
-[ "$killed" -eq 1 ] || fail "killed $killed workers of n3, not one"
+within 60 'two workers at work' computing losing
+# everything of node n3 at once: its worker, the shell and the step's daemon above it, and the node's daemon
+mapfile -t lost < <(workers_of "$job" n3)
+[ "${#lost[@]}" -eq 1 ] || fail "${#lost[@]} workers on n3, not one"
+shell=$(parent_of "${lost[0]}")
+kill -9 "${lost[0]}" "$(parent_of "$shell")" "$shell" "$(cat run/slurmd.n3.pid)"
 [ "$(field "$job" JobState)" = RUNNING ] || fail 'the job was over before its node was lost'
 [ ! -e losing ] || fail 'the solve was over before its node was lost'
 # the job itself cannot be tidied away on a node that is gone
