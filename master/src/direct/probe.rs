@@ -19,7 +19,7 @@ const THIN_POINTS: f64 = 64.0;
 const ALONG_POINTS: f64 = 4.0;
 
 /// Rays for an organ.
-const RAYS: f64 = 64.0;
+const RAYS: f64 = 32.0;
 
 /// Where all organs and sources together would need more rays than this, none is probed: then there are
 /// so many small organs that the lattice is right for all of them together, and its error is stated for
@@ -105,9 +105,11 @@ impl Probe {
         }))
     }
 
-    /// Rays for an element that is this part of its organ.
-    pub(super) fn rays_of(part: f64) -> u32 {
-        (RAYS * part).ceil().clamp(1.0, RAYS) as u32
+    /// Rays for an element that stands between these parts of its organ, when its elements are laid end to
+    /// end: many elements share one.
+    pub(super) fn rays_between(from: f64, to: f64) -> u32 {
+        let before = |part: f64| (RAYS * part.min(1.0) + 0.5).floor();
+        (before(to) - before(from)) as u32
     }
 
     /// How many of `rays` rays from an element towards source number `source` meet nothing.

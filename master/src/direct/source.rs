@@ -35,6 +35,16 @@ struct OfOrgan {
     met: u32,
 }
 
+/// What rays say of an organ.
+#[derive(Clone, Copy, Default)]
+struct Probed {
+    /// The part of its area whose rays are cast.
+    part: f64,
+    rays: f64,
+    /// Rays that meet nothing.
+    free: f64,
+}
+
 /// An element that is lit.
 struct Lit {
     element: usize,
@@ -211,40 +221,55 @@ impl Beam<'_> {
     /// forgotten.
     fn probe(&self, probe: &Probe, thin: &Thin, scratch: &mut Scratch, direct: &mut Direct) {
         let world = self.world;
-        let mut rays_of_organ = vec![[0.0; 2]; thin.organ.len()];
+        let mut organs = vec![Probed::default(); thin.organ.len()];
         let first = scratch.lit.len();
+        let mut free_of_rays = Vec::new();
         let (mut shown_m2, mut projected_m2) = (0.0, 0.0);
         for (e, &t) in world.triangle_of_element.iter().enumerate() {
             let o = self.organ_of(t);
-            let projected = self.projected_m2(e);
             if !thin.organ[o] {
                 continue;
             }
+            let projected = self.projected_m2(e);
             let points = scratch.visible[2 * e] + scratch.visible[2 * e + 1];
             shown_m2 += f64::from(points) * self.line_area_m2;
             projected_m2 += projected.abs();
             if projected == 0.0 {
                 continue;
             }
-            let rays = Probe::rays_of(projected.abs() / thin.projected_m2[o]);
+            let organ = &mut organs[o];
+            let to = organ.part + projected.abs() / thin.projected_m2[o];
+            let rays = Probe::rays_between(organ.part, to);
             let free = probe.lit(world, e, (self.k, self.towards), rays);
-            rays_of_organ[o][0] += f64::from(free);
-            rays_of_organ[o][1] += f64::from(rays);
+            organ.part = to;
+            organ.free += f64::from(free);
+            organ.rays += f64::from(rays);
+            free_of_rays.push([free, rays].map(f64::from));
             scratch.lit.push(Lit {
                 element: e,
                 upper: projected > 0.0,
-                area_m2: projected.abs() * f64::from(free) / f64::from(rays),
-                // of one ray; what is free of all of the organ is known only below
-                variance_m4: projected * projected / f64::from(rays),
+                // as if all of it were lit; what is free of it is known only below
+                area_m2: projected.abs(),
+                variance_m4: 0.0,
             });
         }
         let mut lit_m2 = 0.0;
-        for lit in &mut scratch.lit[first..] {
+        for (lit, [free, rays]) in scratch.lit[first..].iter_mut().zip(free_of_rays) {
             let o = self.organ_of(world.triangle_of_element[lit.element]);
+            let (probed, projected_m2) = (&organs[o], lit.area_m2);
+            // an element without a ray of its own is as its organ
+            lit.area_m2 *= if rays > 0.0 {
+                free / rays
+            } else {
+                probed.free / probed.rays.max(1.0)
+            };
             // a few rays that all say the same are no certainty (Jeffreys)
-            let [free, rays] = rays_of_organ[o];
-            let part = (free + 0.5) / (rays + 1.0);
-            lit.variance_m4 *= part * (1.0 - part);
+            let part = (probed.free + 0.5) / (probed.rays + 1.0);
+            let of_a_ray = part * (1.0 - part);
+            lit.variance_m4 = projected_m2 * projected_m2 * of_a_ray / rays.max(1.0);
+            // elements that share a ray err together
+            let together = projected_m2 * thin.projected_m2[o] * of_a_ray / probed.rays.max(1.0);
+            self.add_organ_variance(lit, together, &mut direct.organ_variance_W2);
             lit_m2 += lit.area_m2;
             let organ = &mut scratch.organ[o];
             organ.seen_m2 += lit.area_m2;
@@ -257,18 +282,14 @@ impl Beam<'_> {
                 direct.incoming_W[b] += i * (lit_m2 - shown_m2);
             }
         }
-        for lit in &scratch.lit[first..] {
-            self.add_organ_variance(lit, &mut direct.organ_variance_W2);
-        }
     }
 
-    fn add_organ_variance(&self, lit: &Lit, variance_W2: &mut [f64]) {
+    fn add_organ_variance(&self, lit: &Lit, variance_m4: f64, variance_W2: &mut [f64]) {
         let t = self.world.triangle_of_element[lit.element];
         let (bands, material) = (&self.problem.bands, self.problem.scene.material[t as usize]);
         for (b, i) in self.intensity.iter().enumerate() {
             let absorbed = i * absorptance(&bands[b], material as usize, lit.upper);
-            variance_W2[self.organ_of(t) * bands.len() + b] +=
-                absorbed * absorbed * lit.variance_m4;
+            variance_W2[self.organ_of(t) * bands.len() + b] += absorbed * absorbed * variance_m4;
         }
     }
 
@@ -335,7 +356,7 @@ impl Beam<'_> {
                 variance_m4: projected_m2.abs() * line_area_m2 * if unmet { 1.0 } else { visible },
             };
             if unmet {
-                self.add_organ_variance(&lit, &mut direct.organ_variance_W2);
+                self.add_organ_variance(&lit, lit.variance_m4, &mut direct.organ_variance_W2);
             }
             scratch.lit.push(lit);
         }
