@@ -13,13 +13,13 @@ use crate::exchange::{BlockOf, block_message};
 use crate::world::World;
 
 /// An organ of less area than this many points is probed,
-const THIN_POINTS: f64 = 64.0;
+const THIN_POINTS: f64 = 16.0;
 
 /// and so is one that is nearly along the light, and is met by fewer points than this, on average.
 const ALONG_POINTS: f64 = 4.0;
 
-/// Rays for an organ.
-const RAYS: f64 = 32.0;
+/// Rays for an organ, from each source: those of all sources together make its light.
+const RAYS: f64 = 8.0;
 
 /// Where all organs and sources together would need more rays than this, none is probed: then there are
 /// so many small organs that the lattice is right for all of them together, and its error is stated for
@@ -120,6 +120,9 @@ impl Probe {
         (source, towards): (usize, DVec3),
         rays: u32,
     ) -> u32 {
+        if rays == 0 {
+            return 0;
+        }
         let t = world.triangle_of_element[element];
         let triangle = &world.soup.triangles()[t as usize];
         let local = element as u32 - world.elements.first[t as usize];
