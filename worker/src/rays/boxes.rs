@@ -21,13 +21,18 @@ pub(super) struct Boxes {
 }
 
 impl Boxes {
-    /// Of all triangles and, with a pattern, of those copies of them that reach into it. `tree` takes
-    /// points to the units of the tree, in which boxes are padded.
-    pub(super) fn of(block: &Block, tree: impl Fn(DVec3) -> DVec3, padding: f64) -> Self {
+    /// Of the triangles that `keep` holds of and, with a pattern, of those copies of them that reach into it.
+    /// `tree` takes points to the units of the tree, in which boxes are padded.
+    pub(super) fn of(
+        block: &Block,
+        keep: impl Fn(usize) -> bool,
+        tree: impl Fn(DVec3) -> DVec3,
+        padding: f64,
+    ) -> Self {
         let mut all = Vec::with_capacity(block.soup.triangles().len());
         for (t, triangle) in block.soup.triangles().iter().enumerate() {
             // what has no area is never met
-            if geometry::area(triangle) == 0.0 {
+            if !keep(t) || geometry::area(triangle) == 0.0 {
                 continue;
             }
             let Some((a, b)) = geometry::bounds(triangle) else {

@@ -6,6 +6,7 @@ mod meeting;
 #[cfg(test)]
 mod tests;
 mod tracer;
+mod tree;
 
 use std::ops::Range;
 
@@ -20,8 +21,8 @@ use rayon::prelude::*;
 use crate::block::Block;
 use crate::part::Part;
 use crate::rows::{Pair, Traced};
-use tracer::FaceRay;
 pub use tracer::Tracer;
+use tree::FaceRay;
 
 /// Triangles whose rays are cast as one task.
 const TASK: usize = 256;

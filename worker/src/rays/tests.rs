@@ -6,7 +6,8 @@ use nestrad_proto::v1;
 use proptest::prelude::*;
 
 use super::meeting::Edges;
-use super::tracer::{FaceRay, Tracer};
+use super::tracer::Tracer;
+use super::tree::FaceRay;
 use crate::block::Block;
 
 fn vector(v: DVec3) -> v1::Vector {

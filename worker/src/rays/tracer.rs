@@ -1,96 +1,37 @@
-//! The nearest thing along a ray, in a scene that may repeat for ever.
-//!
-//! obvhs (CWBVH, f32) says which triangles a ray may meet; whether and where it meets them is
-//! decided in f64 on the original vertices, with an edge test that leaves no gap between neighbours.
+//! What a ray from a face sees.
 
-use std::time::Duration;
+use glam::{DVec2, DVec3};
+use nestrad_common::geometry;
 
-use glam::{DVec2, DVec3, Vec3A};
-use nestrad_common::{elements, geometry};
-use obvhs::BvhBuildParams;
-use obvhs::cwbvh::CwBvh;
-use obvhs::cwbvh::builder::build_cwbvh;
-use obvhs::ray::{Ray, RayHit};
-
-use super::boxes::{Boxes, Shift};
-use super::meeting::Edges;
+use super::tree::{FaceRay, Tree};
 use crate::block::Block;
 
-/// The acceleration structure of a block.
+/// The acceleration structures of a block.
 pub struct Tracer {
-    bvh: CwBvh,
-    /// Triangles of each leaf of the tree: where its list starts in `members`, and their number at the end.
-    first_member: Vec<u32>,
-    /// Local triangles and copies of them.
-    members: Vec<(u32, Shift)>,
-    /// Tree units per metre: obvhs drops nodes nearer than 1e-4 of its units.
-    scale: f64,
-    centre: DVec3,
-    z_min_m: f64,
-    z_max_m: f64,
-    /// What lies closer together than this touches, metres.
-    touch_m: f64,
+    all: Tree,
+    /// What is the surface of something solid, where anything is.
+    solids: Option<Solids>,
 }
 
-/// obvhs enters nodes no nearer than this, in its units.
-const NEAREST_NODE: f64 = 1e-4;
-
-/// Half the extent of the scene in tree units: large enough that `NEAREST_NODE` is below the rounding
-/// of f32 coordinates, small enough that nothing overflows.
-const HALF_EXTENT: f64 = 1e4;
-
-/// Rounding of a box and of a ray to f32, in units of the last place of the extent: half a unit for each
-/// of the ray's origin, its direction, the inverse of that, a difference and a product, over twice the
-/// half extent.
-const ROUNDINGS: f64 = 6.0;
-
-/// Two surfaces touch when they are closer than this part of the scene's extent: rounding in f64 says
-/// nothing of which is nearer. Then they lie as the lines have them, by rising number from below.
-const TOUCH: f64 = 1e-12;
-
-/// A ray that has crossed this many patterns without a hit is taken to leave the canopy sideways.
-const MOST_PATTERNS: usize = 100_000;
+struct Solids {
+    tree: Tree,
+    /// Nothing is longer, metres.
+    longest_m: f64,
+}
 
 impl Tracer {
-    /// Builds the tree over all triangles of the block and, with a pattern, over those copies of them
-    /// that reach into it.
+    /// Builds them.
     pub fn new(block: &Block) -> Self {
-        let extent = &block.extent;
-        let (mut lo, mut hi) =
-            geometry::bounds(block.soup.triangles().iter().flatten()).unwrap_or_default();
-        let (z_min_m, z_max_m) = (lo.z, hi.z);
-        // rays begin on the soil too, which may reach far beyond the leaves
-        (lo, hi) = (lo.min(extent.min_m), hi.max(extent.max_m));
-        if extent.periodic {
-            (lo.x, lo.y) = extent.min_m.truncate().into();
-            (hi.x, hi.y) = extent.max_m.truncate().into();
-        }
-        let centre = 0.5 * (lo + hi);
-        let scale = HALF_EXTENT / (0.5 * (hi - lo)).max_element().max(f64::MIN_POSITIVE);
-        let touch_m = TOUCH * lo.abs().max(hi.abs()).max_element();
-        // and the nodes that obvhs takes as passed
-        let padding = HALF_EXTENT * f64::from(f32::EPSILON) * ROUNDINGS + 2.0 * NEAREST_NODE;
-
-        let tree = |p: DVec3| (p - centre) * scale;
-        let Boxes {
-            boxes,
-            first_member,
-            members,
-        } = Boxes::of(block, tree, padding);
-        let bvh = build_cwbvh(
-            &boxes,
-            BvhBuildParams::medium_build(),
-            &mut Duration::default(),
-        );
+        let is_solid = |t: usize| block.solid[block.first[t] as usize];
+        let triangles = block.soup.triangles().iter().enumerate();
+        let solid = triangles.filter(|&(t, _)| is_solid(t));
+        let bounds = geometry::bounds(solid.flat_map(|(_, triangle)| triangle));
         Self {
-            bvh,
-            first_member,
-            members,
-            scale,
-            centre,
-            z_min_m,
-            z_max_m,
-            touch_m,
+            all: Tree::of(block, |_| true),
+            solids: bounds.map(|(lo, hi)| Solids {
+                tree: Tree::of(block, is_solid),
+                longest_m: (hi - lo).length() * (1.0 + 1e-9),
+            }),
         }
     }
 
@@ -124,17 +65,17 @@ impl Tracer {
         };
         let soil_t = match &block.soil {
             // what lies under the soil gets no light
-            Some(soil) if origin.z < soil.z_m - self.touch_m => {
+            Some(soil) if origin.z < soil.z_m - self.all.touch_m => {
                 return block.local(block.ends.buried());
             }
             Some(soil) if direction.z < 0.0 => to_height(soil.z_m),
             _ => f64::INFINITY,
         };
         // what touches the soil lies on it
-        let soil_limit = soil_t + self.touch_m / direction.z.abs();
+        let soil_limit = soil_t + self.all.touch_m / direction.z.abs();
         // past the top or bottom of the leaves there is nothing more to hit
-        let limit = soil_limit.min(self.reach_m(ray)).min(block.radius_m);
-        match self.nearest(block, ray, limit) {
+        let limit = soil_limit.min(self.all.reach_m(ray)).min(block.radius_m);
+        match self.all.nearest(block, ray, limit) {
             Some((_, face)) if self.is_buried(block, ray, face) => {
                 block.local(if block.is_inside(ray.face) {
                     block.ends.void()
@@ -147,191 +88,30 @@ impl Tracer {
         }
     }
 
-    /// Whether a ray that sees `face` runs inside something solid (see `lines::burial`): the line it
-    /// lies on meets the inside at both ends.
+    /// Whether a ray that sees `face` runs inside something solid (see `lines::burial`): whatever leaves lie
+    /// there, the line it lies on meets the inside of something solid first at both ends.
     fn is_buried(&self, block: &Block, ray: &FaceRay, face: u32) -> bool {
-        let back = || {
-            let reverse = FaceRay {
-                direction: -ray.direction,
-                ..*ray
-            };
-            self.nearest(block, &reverse, block.radius_m.min(self.reach_m(&reverse)))
+        let Some(solids) = self
+            .solids
+            .as_ref()
+            .filter(|_| ray.face < block.local_faces)
+        else {
+            return false;
         };
-        let onwards = || {
-            let limit = block.radius_m.min(self.reach_m(ray));
-            let (t, _) = self.nearest(block, ray, limit)?;
-            let next = FaceRay {
-                origin: ray.origin + t * ray.direction,
-                source: self.triangle_of(block, face),
-                ..*ray
-            };
-            self.nearest(block, &next, limit - t)
+        let from_inside = block.is_inside(ray.face);
+        if block.is_solid(ray.face) && !(from_inside && !block.is_inside(face)) {
+            return false;
+        }
+        let inside = |direction: DVec3, limit: f64| {
+            let ray = FaceRay { direction, ..*ray };
+            let limit = limit.min(solids.tree.reach_m(&ray));
+            let (t, face) = solids.tree.nearest(block, &ray, limit)?;
+            block.is_inside(face).then_some(t)
         };
-        let inside = |end: Option<(f64, u32)>| end.is_some_and(|(_, f)| block.is_inside(f));
-        match (block.is_inside(ray.face), block.is_inside(face)) {
-            (false, true) => inside(back()),
-            (true, false) => inside(onwards()),
-            (true, true) | (false, false) => false,
-        }
+        let longest = block.radius_m.min(solids.longest_m);
+        inside(ray.direction, longest)
+            .is_some_and(|ahead| from_inside || inside(-ray.direction, longest - ahead).is_some())
     }
-
-    /// How far a ray can go before it has passed all leaves, metres; a hair more, so that rounding does
-    /// not lose what lies exactly at their top or bottom.
-    fn reach_m(&self, ray: &FaceRay) -> f64 {
-        let z = if ray.direction.z > 0.0 {
-            self.z_max_m
-        } else {
-            self.z_min_m
-        };
-        match ray.direction.z {
-            0.0 => f64::INFINITY,
-            dz => (z - ray.origin.z) / dz * (1.0 + 1e-9) + 1e-9 / dz.abs(),
-        }
-    }
-
-    fn triangle_of(&self, block: &Block, face: u32) -> Option<u32> {
-        block
-            .first
-            .partition_point(|&f| f <= face / 2)
-            .checked_sub(1)
-            .map(|t| t as u32)
-    }
-
-    fn nearest(&self, block: &Block, ray: &FaceRay, limit: f64) -> Option<(f64, u32)> {
-        if !block.extent.periodic {
-            return self.nearest_in_pattern(block, ray, [0, 0], 0.0, limit);
-        }
-        // from pattern to pattern, in the order in which the ray crosses them
-        let (min, max) = (block.extent.min_m.truncate(), block.extent.max_m.truncate());
-        let at = ((ray.origin.truncate() - min) / (max - min)).floor();
-        let mut pattern = [at.x as i64, at.y as i64];
-        let mut entered = 0.0;
-        for _ in 0..MOST_PATTERNS {
-            let home = ray.origin - block.shift_m(pattern);
-            let (leaves, step) = exit(home, ray.direction, min, max);
-            match self.nearest_in_pattern(block, ray, pattern, entered, limit) {
-                // what is hit farther on may be hidden by copies that do not reach into this pattern
-                Some((t, face)) if t <= leaves => return Some((t, face)),
-                _ if leaves >= limit => return None,
-                _ => {}
-            }
-            pattern = [pattern[0] + step[0], pattern[1] + step[1]];
-            entered = leaves;
-        }
-        None
-    }
-
-    /// The nearest hit up to `limit` of all that reaches into a pattern, which the ray enters at
-    /// distance `entered`.
-    fn nearest_in_pattern(
-        &self,
-        block: &Block,
-        ray: &FaceRay,
-        pattern: Shift,
-        entered: f64,
-        limit: f64,
-    ) -> Option<(f64, u32)> {
-        let home = ray.origin - block.shift_m(pattern);
-        let start = ((home + entered * ray.direction - self.centre) * self.scale).as_vec3a();
-        let reach = (((limit - entered) * self.scale) as f32) * (1.0 + 1e-5) + 1.0;
-        let edges = Edges::new(ray.direction);
-        let up = ray.direction.z >= 0.0;
-        let mut best: Option<Hit> = None;
-        let tree_ray = Ray::new(start, tree_direction(ray.direction), 0.0, reach.max(0.0));
-        self.bvh
-            .ray_traverse(tree_ray, &mut RayHit::none(), |_, leaf| {
-                let leaf = self.bvh.primitive_indices[leaf] as usize;
-                let members =
-                    self.first_member[leaf] as usize..self.first_member[leaf + 1] as usize;
-                let mut nearest = f64::INFINITY;
-                for &(t, copy) in &self.members[members] {
-                    let away = [pattern[0] + copy[0], pattern[1] + copy[1]];
-                    let place = (t, away);
-                    if Some(place) == ray.source.map(|t| (t, [0, 0])) {
-                        continue;
-                    }
-                    let triangle = &block.soup.triangles()[t as usize];
-                    let Some(mut hit) = edges.meet(triangle, ray.origin - block.shift_m(away))
-                    else {
-                        continue;
-                    };
-                    let slack = self.touch_in_t(triangle, ray.direction, hit.t);
-                    if hit.t.abs() <= slack {
-                        // it touches what the ray leaves
-                        let above = ray.source.is_none_or(|t| place > (t, [0, 0]));
-                        if above != up {
-                            continue;
-                        }
-                        hit.t = 0.0;
-                    } else if hit.t < 0.0 {
-                        continue;
-                    }
-                    let nearer = best.as_ref().is_none_or(|best| {
-                        if (hit.t - best.t).abs() <= slack {
-                            (place < best.place) == up
-                        } else {
-                            hit.t < best.t
-                        }
-                    });
-                    if hit.t > limit || !nearer {
-                        continue;
-                    }
-                    let (first, n) = (block.first[t as usize], block.divisions[t as usize]);
-                    best = Some(Hit {
-                        t: hit.t,
-                        place,
-                        face: 2 * (first + elements::piece(n, hit.b1, hit.b2))
-                            + u32::from(!hit.upper),
-                    });
-                    nearest = hit.t;
-                }
-                // a hair farther, so that rounding to f32 cannot hide a nearer triangle
-                ((nearest - entered) * self.scale) as f32 * (1.0 + 1e-6) + 2.0 * NEAREST_NODE as f32
-            });
-        best.map(|hit| (hit.t, hit.face))
-    }
-
-    /// How far apart along a ray two surfaces like this one may be met and still touch.
-    fn touch_in_t(&self, triangle: &[DVec3; 3], direction: DVec3, t: f64) -> f64 {
-        // far beyond any rounding no cosine need be known
-        if t.abs() > self.touch_m / SMALLEST_COSINE {
-            return self.touch_m;
-        }
-        let normal = geometry::doubled_area_vector(triangle);
-        let cosine = (normal.dot(direction) / normal.length()).abs();
-        self.touch_m / cosine.max(SMALLEST_COSINE)
-    }
-}
-
-/// A direction for obvhs, which loses boxes along a ray that is exactly parallel to an axis: infinity times
-/// zero is no number.
-fn tree_direction(direction: DVec3) -> Vec3A {
-    let along = |d: f32| if d.abs() < 1e-12 { 1e-12 } else { d };
-    let d = direction.as_vec3a();
-    Vec3A::new(along(d.x), along(d.y), along(d.z))
-}
-
-/// Surfaces that are met at a smaller angle than this are not asked whether they touch.
-const SMALLEST_COSINE: f64 = 1e-6;
-
-/// The nearest triangle so far.
-struct Hit {
-    t: f64,
-    /// Triangle and copy.
-    place: (u32, Shift),
-    face: u32,
-}
-
-/// A ray from a face.
-#[derive(Clone, Copy)]
-pub(crate) struct FaceRay {
-    /// The local face, or soil cell, that it leaves.
-    pub(crate) face: u32,
-    pub(crate) origin: DVec3,
-    /// Unit vector.
-    pub(crate) direction: DVec3,
-    /// The local triangle that it leaves, if it does not leave the soil; it cannot hit it again (but copies of it it can).
-    pub(crate) source: Option<u32>,
 }
 
 /// What is seen when no triangle is hit within reach.
@@ -358,22 +138,6 @@ fn beyond(block: &Block, origin: DVec3, direction: DVec3, soil_t: f64, random: f
     } else {
         ends.far_from_above(bin, level)
     })
-}
-
-/// Where a ray that is in the rectangle leaves it, and by which step of the pattern.
-fn exit(home: DVec3, direction: DVec3, min: DVec2, max: DVec2) -> (f64, Shift) {
-    let side = |p: f64, d: f64, lo: f64, hi: f64| match d {
-        d if d > 0.0 => (((hi - p) / d).max(0.0), 1),
-        d if d < 0.0 => (((lo - p) / d).max(0.0), -1),
-        _ => (f64::INFINITY, 0),
-    };
-    let (tx, sx) = side(home.x, direction.x, min.x, max.x);
-    let (ty, sy) = side(home.y, direction.y, min.y, max.y);
-    if tx <= ty {
-        (tx, [sx, 0])
-    } else {
-        (ty, [0, sy])
-    }
 }
 
 fn soil_cell(block: &Block, at: DVec3) -> Option<u32> {
