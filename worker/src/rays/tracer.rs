@@ -99,7 +99,7 @@ impl Tracer {
             return false;
         };
         let from_inside = block.is_inside(ray.face);
-        if block.is_solid(ray.face) && !(from_inside && !block.is_inside(face)) {
+        if block.is_solid(ray.face) && (!from_inside || block.is_inside(face)) {
             return false;
         }
         let inside = |direction: DVec3, limit: f64| {
