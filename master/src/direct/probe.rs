@@ -24,7 +24,7 @@ const RAYS: f64 = 8.0;
 /// Where all organs and sources together would need more rays than this, none is probed: then there are
 /// so many small organs that the lattice is right for all of them together, and its error is stated for
 /// each.
-const MOST_RAYS: f64 = 1e7;
+const MOST_RAYS: f64 = 1e6;
 
 /// The scene as rays see it.
 pub(super) struct Probe {
