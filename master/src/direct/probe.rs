@@ -12,11 +12,8 @@ use rayon::prelude::*;
 use crate::exchange::{BlockOf, block_message};
 use crate::world::World;
 
-/// An organ of less area than this many points is probed,
+/// An organ of less area than this many points is probed.
 const THIN_POINTS: f64 = 16.0;
-
-/// and so is one that is nearly along the light, and is met by fewer points than this, on average.
-const ALONG_POINTS: f64 = 4.0;
 
 /// Rays for an organ, from each source: those of all sources together make its light.
 const RAYS: f64 = 8.0;
@@ -24,7 +21,7 @@ const RAYS: f64 = 8.0;
 /// Where all organs and sources together would need more rays than this, none is probed: then there are
 /// so many small organs that the lattice is right for all of them together, and its error is stated for
 /// each.
-const MOST_RAYS: f64 = 1e6;
+const MOST_RAYS: f64 = 2e5;
 
 /// The scene as rays see it.
 pub(super) struct Probe {
@@ -55,8 +52,7 @@ impl Thin {
             projected_m2[o] += 0.5 * normal.dot(towards).abs();
         }
         let is_thin = |(area, projected): (&f64, &f64)| {
-            *projected > 0.0
-                && (*area < THIN_POINTS * line_area_m2 || *projected < ALONG_POINTS * line_area_m2)
+            *projected > 0.0 && *area < THIN_POINTS * line_area_m2
         };
         Self {
             organ: area_m2.iter().zip(&projected_m2).map(is_thin).collect(),
