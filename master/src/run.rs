@@ -38,8 +38,8 @@ pub struct Counters {
     pub direct_lines: u64,
     /// Lines, segments, rays and row entries of the exchange.
     pub exchange: Traced,
-    /// Jobs of the exchange; `None` where another master had them done.
-    pub jobs: Option<JobCounts>,
+    /// Jobs of the exchange.
+    pub jobs: JobCounts,
     /// Passes of the solver over all rows.
     pub passes: u32,
 }
@@ -150,7 +150,7 @@ pub fn solve_with(
         elements: world.elements.len(),
         direct_lines: direct.lines,
         exchange: exchange.counters,
-        jobs: Some(exchange.jobs),
+        jobs: exchange.jobs,
         passes: irradiance.passes,
     };
     Ok(Finished { solution, counters })

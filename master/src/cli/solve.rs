@@ -13,7 +13,7 @@ use nestrad_common::inspection::Inspection;
 use nestrad_common::light::sky::directions_for;
 use nestrad_common::options::{self, Diameter, Options};
 use nestrad_common::problem::Problem;
-use nestrad_master::exchange::Traced;
+use nestrad_master::exchange::{JobCounts, Traced};
 use nestrad_master::output::progress::Progress;
 use nestrad_master::output::resources::{Stage, Stopwatch, Usage};
 use nestrad_master::output::summary::Summary;
@@ -329,7 +329,10 @@ fn elsewhere(remote: Remote) -> Result<Computed> {
                 rays: summary.rays,
                 row_entries: summary.row_entries,
             },
-            jobs: None,
+            jobs: JobCounts {
+                traced: summary.jobs_traced,
+                kept: summary.jobs_kept,
+            },
             passes: summary.passes,
         },
         stages: stages.collect(),

@@ -60,6 +60,8 @@ impl Outcome {
             wall_s: usage.wall_s,
             cpu_s: usage.cpu_s,
             peak_memory_bytes: usage.peak_memory_bytes.unwrap_or(0),
+            jobs_traced: counters.jobs.traced,
+            jobs_kept: counters.jobs.kept,
         };
         Ok(Self {
             bands: scene.light().bands.iter().map(|b| b.name.clone()).collect(),
