@@ -2,8 +2,9 @@
 //! is on top keeps the light (DESIGN: sections 2 and 4).
 //!
 //! An organ gets the light of the lattice points that it shows, which sums to the incoming light
-//! exactly (an organ that is met by a few points only is probed with rays instead). Within an organ, light is dealt out by how much of each element is seen (visible points
-//! over all of its points), so a fully lit leaf is evenly lit however few points its elements have.
+//! exactly; where only a few organs are too small for the lattice, these are probed with rays instead.
+//! Within an organ, light is dealt out by how much of each element is seen (visible points over all of
+//! its points), so a fully lit leaf is evenly lit however few points its elements have.
 
 mod buffer;
 mod outlines;
