@@ -528,11 +528,11 @@ fn counts() -> Vec<Case> {
         ),
         Case::new(
             AXIS,
-            "2e4 leaves within a micrometre",
+            "1e5 leaves within a micrometre",
             "white: albedo 1",
             || {
                 let mut scenery = Scenery::periodic(DVec2::new(0.01, 0.01)).soil(0.0);
-                for k in 0..20_000u32 {
+                for k in 0..100_000u32 {
                     let k = f64::from(k);
                     let at = |step: f64| (k * step).fract() * 1e-6;
                     let foot =
