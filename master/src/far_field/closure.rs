@@ -14,7 +14,8 @@ use serde::Serialize;
 
 use super::layers::Layers;
 use super::transport;
-use crate::exchange::{BatchRows, BlockOf, batch_of_lines, block_message};
+use crate::exchange::{BatchRows, BlockOf, HalfRows, batch_of_lines, block_message};
+use crate::solver::HALF_BATCHES;
 use crate::world::World;
 
 /// How finely the far field is resolved.
@@ -24,19 +25,19 @@ pub struct Resolution {
     pub levels: u32,
     /// Bins per hemisphere, uniform in the cosine of the zenith angle.
     pub bins: u32,
-    /// Sets of axes along which lines are drawn, in each half.
-    pub sets: u32,
+    /// Sets of axes along which lines are drawn, in each of the batches of a half.
+    pub sets_per_batch: u32,
     /// Lines of a half, about.
     pub lines: u32,
     /// Start of all random numbers.
     pub seed: u64,
 }
 
-/// What the far field is the mean of, from two independent halves of lines.
+/// What the far field is the mean of, from two independent halves of lines, each in independent batches.
 #[derive(Clone, Debug, Default)]
 pub struct FarRows {
     /// A row for each far end, then one for all that leaves upwards and one for all that leaves downwards.
-    pub halves: [BatchRows; 2],
+    pub halves: [HalfRows; 2],
 }
 
 impl FarRows {
@@ -52,21 +53,28 @@ impl FarRows {
             &BlockOf::whole(world),
         ))?;
         let size = world.extent.max_m - world.extent.min_m;
-        let directions = resolution.sets * Axes::Both.count();
+        let directions = HALF_BATCHES as u32 * resolution.sets_per_batch * Axes::Both.count();
         // lines are counted on the ground; a direction has |cos| of them, 1/2 on average
         let line_area_m2 =
             0.5 * size.x * size.y * f64::from(directions) / f64::from(resolution.lines);
-        let mut rows = Self::default();
-        for (half, rows) in rows.halves.iter_mut().enumerate() {
-            let batch = batch_of_lines(
-                (resolution.seed, Purpose::FarField, half as u64),
-                (Axes::Both, resolution.sets),
+        let batch = |index: usize| {
+            let lines = batch_of_lines(
+                (resolution.seed, Purpose::FarField, index as u64),
+                (Axes::Both, resolution.sets_per_batch),
                 line_area_m2,
             );
-            let seen = nestrad_worker::trace_far_field(&block, &batch);
-            *rows = BatchRows::new(&seen.lengths, seen.ends);
-        }
-        Ok(rows)
+            let seen = nestrad_worker::trace_far_field(&block, &lines);
+            BatchRows::new(&seen.lengths, seen.ends)
+        };
+        let half = |h: usize| {
+            let batches: Vec<BatchRows> = (h * HALF_BATCHES..(h + 1) * HALF_BATCHES)
+                .map(batch)
+                .collect();
+            HalfRows::join(&batches)
+        };
+        Ok(Self {
+            halves: [half(0), half(1)],
+        })
     }
 }
 

@@ -324,7 +324,7 @@ fn far_field(settings: &Settings) -> Resolution {
     Resolution {
         levels: 65,
         bins: 6,
-        sets: (16.0 * more).round().clamp(1.0, 256.0) as u32,
+        sets_per_batch: (2.0 * more).round().clamp(1.0, 32.0) as u32,
         lines: (24_000.0 * more).clamp(1e4, 1e6) as u32,
         seed: settings.seed,
     }

@@ -179,12 +179,14 @@ impl Group<'_> {
                 system: self.system,
                 bands,
             };
-            for (half, seen) in [&pass.y, &pass.x].into_iter().enumerate() {
+            let radiosity = [&pass.x, &pass.y].map(|half| -> Vec<_> {
                 let of = |lane: &[f64; N]| {
                     std::array::from_fn(|k| lane.get(pair + k).copied().unwrap_or(0.0))
                 };
-                let seen: Vec<_> = seen.radiosity.iter().map(of).collect();
-                spread.add(half, &seen, variances);
+                half.radiosity.iter().map(of).collect()
+            });
+            for half in 0..2 {
+                spread.add(half, &radiosity, variances);
             }
         }
         Ok(())

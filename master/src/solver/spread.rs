@@ -7,6 +7,10 @@
 //! faces counts too: `dx = r_g + F_A S dy`, `dy = F_B S dx` (the delta method). Batches are independent,
 //! so the variance of anything linear in the irradiances is
 //! `G / (G - 1) sum_g (its change)²` over the G batches of each half.
+//!
+//! The far field is a mean over lines of its own, in as many batches: those pull the radiosities of the far
+//! ends, and what leaves, in the same way. Batch g of the exchange and batch g of the far field are
+//! independent, so they are followed as one: the square of their sum is the sum of their squares on average.
 
 use rayon::prelude::*;
 
@@ -39,6 +43,14 @@ pub(super) struct Spread<'a> {
     pub(super) bands: &'a [usize],
 }
 
+/// How batches pull the irradiances of rows, the radiosities of far ends, and what leaves upwards and
+/// downwards through the far field.
+struct Pulls {
+    rows: Vec<Pull>,
+    far: Vec<Pull>,
+    leaving: [Pull; 2],
+}
+
 /// What a pull does to irradiances, and to what leaves through the far field.
 struct Change {
     irradiance: Vec<Pull>,
@@ -55,11 +67,17 @@ const MOST_STEPS: usize = 12;
 type PerBand = [f64; PULLED_TOGETHER];
 
 impl Spread<'_> {
-    /// Adds the variances that the batches of a half leave to `sums`, one per band. `seen`: radiosity, in
-    /// these bands, of what that half looks at.
-    pub(super) fn add(&self, half: usize, seen: &[PerBand], sums: &mut [Variances]) {
-        let unit = units(seen);
-        let change = self.followed(half, self.pulls(half, seen, unit));
+    /// Adds the variances that the batches of a half leave to `sums`, one per band. `radiosity` of all ends
+    /// in both halves, in these bands: a half's rows look at those of the other, its far field at its own.
+    pub(super) fn add(&self, half: usize, radiosity: &[Vec<PerBand>; 2], sums: &mut [Variances]) {
+        let unit = units(&radiosity[1 - half]);
+        let (far, leaving) = self.far_pulls(half, &radiosity[half], unit);
+        let pulls = Pulls {
+            rows: self.pulls(half, &radiosity[1 - half], unit),
+            far,
+            leaving,
+        };
+        let change = self.followed(half, &pulls);
         for (k, sum) in sums.iter_mut().enumerate() {
             self.collect(&change, (k, unit[k]), sum);
         }
@@ -74,27 +92,33 @@ impl Spread<'_> {
             .into_par_iter()
             .with_min_len(1024)
             .map(|row| {
-                let mut sums = [[0.0; HALF_BATCHES]; PULLED_TOGETHER];
-                let mut counts = [0usize; HALF_BATCHES];
-                for (g, entries) in rows.by_batch(row).enumerate() {
-                    for &end in entries {
-                        for (sums, seen) in sums.iter_mut().zip(&seen[end as usize]) {
-                            sums[g] += seen;
-                        }
-                        counts[g] += usize::from(end != buried);
-                    }
-                }
-                let mean = sums.map(|s| s.iter().sum::<f64>() * weights[row]);
-                Pull::of(std::array::from_fn(|n| {
-                    let (k, g) = (n / HALF_BATCHES, n % HALF_BATCHES);
-                    (sums[k][g] - mean[k] * counts[g] as f64) * weights[row] / unit[k]
-                }))
+                let entries = rows.by_batch(row);
+                pull(entries, |end| end != buried, weights[row], seen, unit)
             })
             .collect()
     }
 
+    /// How each batch of a half of the far field pulls the radiosities of the far ends, and what leaves.
+    fn far_pulls(&self, half: usize, near: &[PerBand], unit: PerBand) -> (Vec<Pull>, [Pull; 2]) {
+        let Some(far) = self.system.far else {
+            return (Vec::new(), [Pull::NONE; 2]);
+        };
+        let (rows, ends) = (&far.halves[half], self.system.world.ends.far_len() as usize);
+        let of = |row: usize| {
+            let weight = 1.0 / rows.row(row).len().max(1) as f64;
+            pull(rows.by_batch(row), |_| true, weight, near, unit)
+        };
+        let pulls = (0..ends).into_par_iter().map(of).collect();
+        let down = if self.system.world.soil.is_some() {
+            Pull::NONE
+        } else {
+            of(ends + 1)
+        };
+        (pulls, [of(ends), down])
+    }
+
     /// The change of the result, the mean of both halves, that pulls on one half bring about.
-    fn followed(&self, half: usize, pulls: Vec<Pull>) -> Change {
+    fn followed(&self, half: usize, pulls: &Pulls) -> Change {
         let world = self.system.world;
         let lanes: Vec<usize> = self
             .bands
@@ -104,14 +128,25 @@ impl Spread<'_> {
         let gather = Gather::<PULLS>::new(&self.system, &lanes);
         let halves = &self.system.exchange.halves;
         let dark = vec![Pull::NONE; world.ends.len() - world.rows()];
-        let first = gather.absorbed(&pulls);
-        let mut pulled = gather.start(pulls.clone(), &dark);
+        let first = gather.absorbed(&pulls.rows);
+        let pull_far = |radiosity: &mut [Pull]| {
+            let far = &mut radiosity[world.ends.far_start() as usize..];
+            for (radiosity, pull) in far.iter_mut().zip(&pulls.far) {
+                *radiosity = sum(radiosity, pull);
+            }
+        };
+        let mut pulled = gather.start(pulls.rows.clone(), &dark);
+        gather.close_far_field(half, &mut pulled.radiosity);
+        pull_far(&mut pulled.radiosity);
         let mut other = gather.start(vec![Pull::NONE; world.rows()], &dark);
         for step in 0..MOST_STEPS {
             let change = if step % 2 == 0 {
                 gather.sweep(1 - half, &halves[1 - half], &pulled, None, &mut other)
             } else {
-                gather.sweep(half, &halves[half], &other, Some(&pulls), &mut pulled)
+                let lit = Some(&pulls.rows[..]);
+                let change = gather.sweep(half, &halves[half], &other, lit, &mut pulled);
+                pull_far(&mut pulled.radiosity);
+                change
             };
             if (0..PULLS).all(|g| change[g] <= FOLLOWED * first[g]) {
                 break;
@@ -124,6 +159,12 @@ impl Spread<'_> {
             gather.leaving(half, &pulled.radiosity),
             gather.leaving(1 - half, &other.radiosity),
         ];
+        let leaving = [0, 1].map(|way: usize| {
+            let through = mean(leaving[0][way], leaving[1][way]);
+            // what pulls one half's mean pulls half as much on that of both
+            let own = pulls.leaving[way].get().map(|p| 0.5 * p);
+            sum(&through, &Pull::of(own))
+        });
         let mut irradiance = pulled.irradiance;
         irradiance
             .par_iter_mut()
@@ -131,7 +172,7 @@ impl Spread<'_> {
             .for_each(|(a, b)| *a = mean(a.get(), b.get()));
         Change {
             irradiance,
-            leaving: [0, 1].map(|way: usize| mean(leaving[0][way], leaving[1][way])),
+            leaving,
         }
     }
 
@@ -197,6 +238,37 @@ impl Spread<'_> {
         add(&mut balance[2], weight * part(&outlook.to_sky), change);
         add(&mut balance[3], weight * part(&outlook.to_void), change);
     }
+}
+
+/// How batches pull a mean over `entries`, by batch, of which those that are not `counted` are dark and not in
+/// the mean; `weight` is one over the number of the others.
+fn pull<'a>(
+    entries: impl Iterator<Item = &'a [u32]>,
+    counted: impl Fn(u32) -> bool,
+    weight: f64,
+    seen: &[PerBand],
+    unit: PerBand,
+) -> Pull {
+    let mut sums = [[0.0; HALF_BATCHES]; PULLED_TOGETHER];
+    let mut counts = [0usize; HALF_BATCHES];
+    for (g, entries) in entries.enumerate() {
+        for &end in entries {
+            for (sums, seen) in sums.iter_mut().zip(&seen[end as usize]) {
+                sums[g] += seen;
+            }
+            counts[g] += usize::from(counted(end));
+        }
+    }
+    let mean = sums.map(|s| s.iter().sum::<f64>() * weight);
+    Pull::of(std::array::from_fn(|n| {
+        let (k, g) = (n / HALF_BATCHES, n % HALF_BATCHES);
+        (sums[k][g] - mean[k] * counts[g] as f64) * weight / unit[k]
+    }))
+}
+
+fn sum(a: &Pull, b: &Pull) -> Pull {
+    let (a, b) = (a.get(), b.get());
+    Pull::of(std::array::from_fn(|g| a[g] + b[g]))
 }
 
 /// A power of two near the largest radiosity in each band: in such units f32 neither overflows nor
