@@ -3,8 +3,10 @@
 //! The lattice is worked off in strips of whole rows, small enough that a strip's fragments stay in
 //! the cache. Within a strip fragments are sorted by line with a counting sort, then by depth.
 
+use std::ops::Range;
+
 use nestrad_common::elements;
-use nestrad_common::lattice::{Lattice, Strips};
+use nestrad_common::lattice::{Lattice, Projected, Strips};
 
 use crate::block::Block;
 use crate::part::Part;
@@ -39,11 +41,56 @@ impl Hit {
 }
 
 /// Lines in a strip: with some ten hits each, a strip's fragments fit a second-level cache.
-const LINES_IN_STRIP: usize = 1 << 14;
+const LINES_IN_STRIP: usize = 1 << 16;
 
-/// Calls `line` with the hits of every line of a part of the lattice, by rising depth; lines by rising
-/// number. Returns the number of lines.
+/// Calls `line` with the number of the lattice and the hits of every line of a part of each lattice, by
+/// rising depth; the lines of a lattice by rising number. Returns the number of lines of each.
+///
+/// Lattices that are one strip each are drawn together, so that the triangles, of which there are more than
+/// a cache holds, are read once for all of them.
 pub(crate) fn for_each_line(
+    block: &Block,
+    lattices: &[Lattice],
+    parts: &[Part],
+    mut line: impl FnMut(usize, usize, &[Hit]),
+) -> Vec<u64> {
+    let is_one_strip = |lattice: &Lattice| lattice.lines() <= LINES_IN_STRIP;
+    if lattices.iter().all(is_one_strip) && parts.iter().all(|part| part.of(1).len() == 1) {
+        return draw_together(block, lattices, line);
+    }
+    let each = lattices.iter().zip(parts).enumerate();
+    each.map(|(k, (lattice, &part))| {
+        for_each_line_of_part(block, lattice, part, |number, hits| line(k, number, hits))
+    })
+    .collect()
+}
+
+fn draw_together(
+    block: &Block,
+    lattices: &[Lattice],
+    mut line: impl FnMut(usize, usize, &[Hit]),
+) -> Vec<u64> {
+    let mut strips: Vec<Strip> = lattices
+        .iter()
+        .map(|lattice| {
+            let mut strip = Strip::default();
+            strip.begin(0..lattice.ny, lattice.nx);
+            strip
+        })
+        .collect();
+    block.soup.for_each_reached_of(lattices, |k, t, triangle| {
+        if let Some(projected) = Projected::new(&lattices[k], triangle) {
+            strips[k].draw(block, &lattices[k], t, &projected);
+        }
+    });
+    for (k, strip) in strips.iter_mut().enumerate() {
+        strip.sort();
+        strip.for_each_line(&mut |number, hits| line(k, number, hits));
+    }
+    lattices.iter().map(|l| l.lines() as u64).collect()
+}
+
+fn for_each_line_of_part(
     block: &Block,
     lattice: &Lattice,
     part: Part,
@@ -55,16 +102,21 @@ pub(crate) fn for_each_line(
     for s in part.of(strips.len() as usize) {
         let rows = strips.rows(s as u32);
         lines += u64::from(rows.end - rows.start) * u64::from(lattice.nx);
-        strip.draw(block, lattice, &strips, s as u32);
+        strip.begin(rows, lattice.nx);
+        strips.for_each(s as u32, |t, projected| {
+            strip.draw(block, lattice, t, projected)
+        });
         strip.sort();
         strip.for_each_line(&mut line);
     }
     lines
 }
 
-/// Fragments of one strip of the lattice; buffers are kept from strip to strip.
+/// Fragments of one strip of a lattice; buffers are kept from strip to strip.
 #[derive(Default)]
 struct Strip {
+    /// Rows of the lattice.
+    rows: Range<u32>,
     first_line: usize,
     /// (line within the strip, hit), as drawn.
     drawn: Vec<(u32, Hit)>,
@@ -74,27 +126,31 @@ struct Strip {
 }
 
 impl Strip {
-    fn draw(&mut self, block: &Block, lattice: &Lattice, strips: &Strips, strip: u32) {
-        let (rows, nx) = (strips.rows(strip), lattice.nx as usize);
+    /// An empty strip of these rows, of `nx` lines each.
+    fn begin(&mut self, rows: Range<u32>, nx: u32) {
+        let nx = nx as usize;
         self.first_line = rows.start as usize * nx;
         self.drawn.clear();
         self.end.clear();
         self.end.resize((rows.end - rows.start) as usize * nx, 0);
-        strips.for_each(strip, |t, projected| {
-            let (first, n) = (block.first[t as usize], block.divisions[t as usize]);
-            projected.scan(lattice, rows.clone(), n > 1, |f| {
-                let element = if n > 1 {
-                    first + elements::piece(n, f.place[0], f.place[1])
-                } else {
-                    first
-                };
-                let line = f.line - self.first_line;
-                self.end[line] += 1;
-                self.drawn.push((
-                    line as u32,
-                    Hit::new(f.depth, element, projected.upper_along),
-                ));
-            });
+        self.rows = rows;
+    }
+
+    /// Adds the hits of triangle `t`.
+    fn draw(&mut self, block: &Block, lattice: &Lattice, t: u32, projected: &Projected) {
+        let (first, n) = (block.first[t as usize], block.divisions[t as usize]);
+        projected.scan(lattice, self.rows.clone(), n > 1, |f| {
+            let element = if n > 1 {
+                first + elements::piece(n, f.place[0], f.place[1])
+            } else {
+                first
+            };
+            let line = f.line - self.first_line;
+            self.end[line] += 1;
+            self.drawn.push((
+                line as u32,
+                Hit::new(f.depth, element, projected.upper_along),
+            ));
         });
     }
 

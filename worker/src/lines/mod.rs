@@ -13,65 +13,70 @@ use rayon::prelude::*;
 use crate::block::Block;
 use crate::part::Part;
 use crate::rows::{Pair, Traced};
+use sight::Sight;
 
-/// Traces the lines of a batch; directions in parallel, each on its own.
+/// Directions that are drawn together: their strips fit a second-level cache.
+const DRAWN_TOGETHER: usize = 8;
+
+/// Traces the lines of a batch; groups of directions in parallel, each on its own.
 pub(crate) fn trace(block: &Block, batch: &v1::Batch) -> Traced {
-    let (lines, pairs): (Vec<u64>, Vec<Vec<Pair>>) = batch
+    let (lines, pairs): (Vec<u64>, Vec<Vec<Vec<Pair>>>) = batch
         .lines
-        .par_iter()
-        .map(|lines| direction(block, lines))
+        .par_chunks(DRAWN_TOGETHER)
+        .map(|group| seen_along(block, group))
         .unzip();
     Traced {
-        pairs,
+        pairs: pairs.into_iter().flatten().collect(),
         lines: lines.iter().sum(),
         ..Traced::default()
     }
 }
 
+/// The number of lines along some directions, and along each direction the pairs that see each other.
+fn seen_along(block: &Block, group: &[v1::Lines]) -> (u64, Vec<Vec<Pair>>) {
+    let (lattices, parts) = lattices(block, group);
+    let sights: Vec<Sight> = lattices.iter().map(|l| Sight::new(block, l)).collect();
+    let mut pairs = vec![Vec::new(); lattices.len()];
+    let lines = fragments::for_each_line(block, &lattices, &parts, |k, line, hits| {
+        sights[k].along(line, hits, &mut pairs[k]);
+    });
+    (lines.iter().sum(), pairs)
+}
+
 /// What stands at the other end of the looks into the far field, along the lines of a batch: (far end, what
 /// is there), by direction and line; past the last end, what leaves upwards and downwards.
 pub(crate) fn beyond_sphere(block: &Block, batch: &v1::Batch) -> Vec<Pair> {
-    let of_direction = |lines: &v1::Lines| {
-        let mut looks = Vec::new();
-        if let Some(lattice) = lattice(block, lines).filter(|l| l.lines() > 0) {
-            let sight = sight::Sight::new(block, &lattice);
-            fragments::for_each_line(block, &lattice, part(lines), |line, hits| {
-                sight.beyond(line, hits, &mut looks);
-            });
-        }
-        looks
+    let of_group = |group: &[v1::Lines]| {
+        let (lattices, parts) = lattices(block, group);
+        let sights: Vec<Sight> = lattices.iter().map(|l| Sight::new(block, l)).collect();
+        let mut looks = vec![Vec::new(); lattices.len()];
+        fragments::for_each_line(block, &lattices, &parts, |k, line, hits| {
+            sights[k].beyond(line, hits, &mut looks[k]);
+        });
+        looks.concat()
     };
     batch
         .lines
-        .par_iter()
-        .map(of_direction)
+        .par_chunks(DRAWN_TOGETHER)
+        .map(of_group)
         .collect::<Vec<_>>()
         .concat()
 }
 
-fn lattice(block: &Block, lines: &v1::Lines) -> Option<Lattice> {
-    let d = lines.direction.as_ref()?;
-    let random = [lines.random_x, lines.random_y, lines.random_count];
-    Some(Lattice::new(
-        DVec3::new(d.x, d.y, d.z),
-        &block.extent,
-        lines.line_area_m2,
-        random,
-    ))
-}
-
-fn part(lines: &v1::Lines) -> Part {
-    Part::new(lines.part, lines.parts)
-}
-
-fn direction(block: &Block, lines: &v1::Lines) -> (u64, Vec<Pair>) {
-    let mut pairs = Vec::new();
-    let Some(lattice) = lattice(block, lines).filter(|l| l.lines() > 0) else {
-        return (0, pairs);
-    };
-    let sight = sight::Sight::new(block, &lattice);
-    let traced = fragments::for_each_line(block, &lattice, part(lines), |line, hits| {
-        sight.along(line, hits, &mut pairs)
-    });
-    (traced, pairs)
+/// The lattices that have any lines, and which part of each is asked for.
+fn lattices(block: &Block, group: &[v1::Lines]) -> (Vec<Lattice>, Vec<Part>) {
+    group
+        .iter()
+        .filter_map(|lines| {
+            let d = lines.direction.as_ref()?;
+            let random = [lines.random_x, lines.random_y, lines.random_count];
+            let lattice = Lattice::new(
+                DVec3::new(d.x, d.y, d.z),
+                &block.extent,
+                lines.line_area_m2,
+                random,
+            );
+            (lattice.lines() > 0).then(|| (lattice, Part::new(lines.part, lines.parts)))
+        })
+        .unzip()
 }

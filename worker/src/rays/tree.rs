@@ -31,10 +31,10 @@ pub(crate) struct FaceRay {
 /// An acceleration structure.
 pub(super) struct Tree {
     bvh: CwBvh,
-    /// Triangles of each leaf of the tree: where its list starts in `members`, and their number at the end.
+    /// Where the list of each leaf of the tree starts in `members`, and their number at the end.
     first_member: Vec<u32>,
-    /// Local triangles and copies of them.
-    members: Vec<(u32, Shift)>,
+    /// In the order in which the tree has them.
+    members: Vec<Member>,
     /// Tree units per metre: obvhs drops nodes nearer than 1e-4 of its units.
     scale: f64,
     centre: DVec3,
@@ -42,6 +42,14 @@ pub(super) struct Tree {
     z_max_m: f64,
     /// What lies closer together than this touches, metres.
     pub(super) touch_m: f64,
+}
+
+/// A triangle, or a copy of it, with its vertices: a ray that comes to a leaf of the tree reads on in one
+/// place, since each other place would be a cache miss.
+struct Member {
+    vertices_m: [DVec3; 3],
+    /// Local triangle and copy.
+    place: (u32, Shift),
 }
 
 /// obvhs enters nodes no nearer than this, in its units.
@@ -94,10 +102,22 @@ impl Tree {
             BvhBuildParams::medium_build(),
             &mut Duration::default(),
         );
+        let mut in_order = Vec::with_capacity(members.len());
+        let mut first_in_order = Vec::with_capacity(first_member.len());
+        for &of_box in &bvh.primitive_indices {
+            first_in_order.push(in_order.len() as u32);
+            let of_box = of_box as usize;
+            let list = first_member[of_box] as usize..first_member[of_box + 1] as usize;
+            in_order.extend(members[list].iter().map(|&place| Member {
+                vertices_m: block.soup.triangles()[place.0 as usize],
+                place,
+            }));
+        }
+        first_in_order.push(in_order.len() as u32);
         Self {
             bvh,
-            first_member,
-            members,
+            first_member: first_in_order,
+            members: in_order,
             scale,
             centre,
             z_min_m,
@@ -164,22 +184,24 @@ impl Tree {
         let tree_ray = Ray::new(start, tree_direction(ray.direction), 0.0, reach.max(0.0));
         self.bvh
             .ray_traverse(tree_ray, &mut RayHit::none(), |_, leaf| {
-                let leaf = self.bvh.primitive_indices[leaf] as usize;
                 let members =
                     self.first_member[leaf] as usize..self.first_member[leaf + 1] as usize;
                 let mut nearest = f64::INFINITY;
-                for &(t, copy) in &self.members[members] {
+                for &Member {
+                    ref vertices_m,
+                    place: (t, copy),
+                } in &self.members[members]
+                {
                     let away = [pattern[0] + copy[0], pattern[1] + copy[1]];
                     let place = (t, away);
                     if Some(place) == ray.source.map(|t| (t, [0, 0])) {
                         continue;
                     }
-                    let triangle = &block.soup.triangles()[t as usize];
-                    let Some(mut hit) = edges.meet(triangle, ray.origin - block.shift_m(away))
+                    let Some(mut hit) = edges.meet(vertices_m, ray.origin - block.shift_m(away))
                     else {
                         continue;
                     };
-                    let slack = self.touch_in_t(triangle, ray.direction, hit.t);
+                    let slack = self.touch_in_t(vertices_m, ray.direction, hit.t);
                     if hit.t.abs() <= slack {
                         // it touches what the ray leaves
                         let above = ray.source.is_none_or(|t| place > (t, [0, 0]));
