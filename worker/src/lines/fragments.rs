@@ -1,7 +1,7 @@
 //! The hits of every line of a lattice, sorted along it.
 //!
-//! The lattice is worked off in strips of whole rows, small enough that a strip's fragments stay in
-//! the cache. Within a strip fragments are sorted by line with a counting sort, then by depth.
+//! A lattice of many lines is worked off in strips of whole rows, which bounds the memory that its
+//! fragments take. Within a strip fragments are sorted by line with a counting sort, then by depth.
 
 use std::ops::Range;
 
@@ -40,7 +40,8 @@ impl Hit {
     }
 }
 
-/// Lines in a strip: with some ten hits each, a strip's fragments fit a second-level cache.
+/// Lines in a strip: with some ten hits each, its fragments take ten megabytes. Smaller strips would stay in a
+/// cache, but for those the triangles have to be sorted into strips first, which costs more.
 const LINES_IN_STRIP: usize = 1 << 16;
 
 /// Calls `line` with the number of the lattice and the hits of every line of a part of each lattice, by

@@ -15,8 +15,8 @@ use crate::part::Part;
 use crate::rows::{Pair, Traced};
 use sight::Sight;
 
-/// Directions that are drawn together: their strips fit a second-level cache.
-const DRAWN_TOGETHER: usize = 8;
+/// Directions that are drawn together: more would save little, and their fragments take memory.
+const DRAWN_TOGETHER: usize = 4;
 
 /// Traces the lines of a batch; groups of directions in parallel, each on its own.
 pub(crate) fn trace(block: &Block, batch: &v1::Batch) -> Traced {
