@@ -38,7 +38,7 @@ pub struct Organ {
 }
 
 /// What a triangle is made of; a band gives it optical properties.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Material {
     /// Opaque part of a CAN species (leaf number 0).
     Stem {

@@ -11,6 +11,7 @@ use crate::exchange::{
     BlockOf, Exchange, ExchangeError, JobCounts, Outlook, Sampling, Traced, trace_here, trace_kept,
 };
 use crate::far_field::closure::{FarRows, from_layers};
+use crate::order::Ordered;
 use crate::output::progress::{Cancelled, Progress};
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
@@ -85,6 +86,8 @@ pub fn solve_with(
     progress: &Progress,
     watch: &mut Stopwatch,
 ) -> Result<Finished, RunError> {
+    let ordered = Ordered::of(problem);
+    let problem = &ordered.problem;
     let world = plan.world(problem);
     watch.lap("elements");
     progress.check()?;
@@ -143,7 +146,7 @@ pub fn solve_with(
         irradiance: &irradiance,
         scattering: &plan.scattering_bands,
     };
-    let solution = parts.assemble();
+    let solution = ordered.back(parts.assemble());
     watch.lap("results");
     progress.finish();
     let counters = Counters {

@@ -1,4 +1,5 @@
-//! What must hold of any scene, over ten thousand small ones. A scene is its seed (`random::scene`).
+//! What must hold of any scene, over ten thousand small ones: of all that has to do with light. A scene is its
+//! seed (`random::scene`). For order, place and limits see `random_scenes_moved.rs`.
 
 #![allow(clippy::unwrap_used)]
 
@@ -109,13 +110,14 @@ proptest! {
             lo + v * (hi - lo)
         };
         let corners = [corner(), corner(), corner()].map(|v| inside(v, &scenery.problem));
-        scenery.triangle("black", corners);
+        // the last of the organs, so that random numbers of the others stay as they are
+        scenery.triangle("something black", corners);
         let materials = scenery.problem.scene.materials.len();
         scenery.problem.bands[0].materials.resize(materials, LeafOptics::default());
         let after = solved(&scenery.problem)?.solution;
         let incoming = before.balance[0].incoming_W;
         for (a, b) in before.organs.iter().zip(&after.organs) {
-            let allowed = 8.0 * a.absorbed_se_W.hypot(b.absorbed_se_W) + 0.02 * incoming;
+            let allowed = 1e-4 * incoming;
             prop_assert!(b.absorbed_W <= a.absorbed_W + allowed, "seed {}: {} to {}", seed, a.absorbed_W, b.absorbed_W);
         }
     }

@@ -15,6 +15,12 @@ fn a_low_sun_across_the_corner_of_an_open_scene_takes_bounded_time() {
     holds(13);
 }
 
+/// A pattern a thousand times as long as it is wide: a source's lattice had no column, and a panic.
+#[test]
+fn a_pattern_narrower_than_a_step_of_the_lattice_is_lit() {
+    holds(1_000_019);
+}
+
 #[test]
 fn wild_scenes_are_solved_soundly_or_refused() {
     (0..40).for_each(holds);

@@ -53,6 +53,8 @@ pub struct Lattice {
 
 /// The sides of a lattice of `lines` points, of which one is near `wanted_y`.
 fn sides(lines: f64, wanted_y: f64, random: f64) -> [f64; 2] {
+    // a pattern that is narrower than a step has one column of all lines, not none of long ones
+    let wanted_y = wanted_y.min(lines.max(1.0));
     let off = |ny: f64| ((lines / ny).round() * ny / lines - 1.0).abs();
     let tried = (0..SIDES_TRIED).map(|k| {
         (wanted_y * (0.75 + 0.5 * k as f64 / SIDES_TRIED as f64))

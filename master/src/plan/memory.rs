@@ -32,9 +32,9 @@ impl Memory {
             .soil_z_m
             .map(|z_m| SoilGrid::over(&extent, z_m, plan.soil_cell_m));
         let rows = 2.0 * elements + soil.map_or(0.0, |s| f64::from(s.cells()));
-        // vertices thrice, a few numbers per element, results of triangles
+        // vertices four times, a few numbers per element, results of triangles
         let scene_bytes =
-            triangles * (3.0 * 72.0 + 40.0 * bands) + elements * 60.0 + 8.0 * rows * bands * 9.0;
+            triangles * (4.0 * 72.0 + 40.0 * bands) + elements * 60.0 + 8.0 * rows * bands * 9.0;
         let Some(sampling) = &plan.sampling else {
             return Self {
                 scene_GiB: scene_bytes / GIB,

@@ -2,6 +2,7 @@
 
 use nestrad_common::geometry;
 use nestrad_common::problem::Problem;
+use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::world::{extent_of, is_soil};
@@ -28,16 +29,20 @@ impl Scale {
         let scene = &problem.scene;
         let soil = is_soil(scene);
         let only_soil = soil.iter().all(|&s| s);
+        // summed by size, so that the order of the input leaves no trace in the rounding
+        let mut areas: Vec<(f64, u32)> = (0..scene.triangles.len())
+            .filter(|&t| only_soil || !soil[t])
+            .map(|t| (geometry::area(&scene.triangles[t]), scene.organ[t]))
+            .collect();
+        areas.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
         let (mut area, mut triangle_squares) = (0.0, 0.0);
         let mut organs = vec![0.0; scene.organs.len()];
-        for (t, triangle) in scene.triangles.iter().enumerate() {
-            if only_soil || !soil[t] {
-                let a = geometry::area(triangle);
-                area += a;
-                triangle_squares += a * a;
-                organs[scene.organ[t] as usize] += a;
-            }
+        for (a, organ) in areas {
+            area += a;
+            triangle_squares += a * a;
+            organs[organ as usize] += a;
         }
+        organs.sort_unstable_by(f64::total_cmp);
         let extent = extent_of(scene);
         let size = extent.max_m - extent.min_m;
         let [x, y, z] = size.to_array();

@@ -1,0 +1,303 @@
+//! What must hold of any scene, over small ones: of order, faces, place and limits. A scene is its seed
+//! (`random::scene`).
+
+#![allow(clippy::unwrap_used)]
+
+use glam::{DVec2, DVec3};
+use nestrad_common::assemble::{Geometry, build_scene};
+use nestrad_common::formats::Mesh;
+use nestrad_common::formats::pattern::Rectangle;
+use nestrad_common::geometry::area;
+use nestrad_common::optics::LeafOptics;
+use nestrad_common::options::{Diameter, Unit};
+use nestrad_common::problem::Problem;
+use nestrad_common::scene::{Material, Pattern};
+use nestrad_master::plan::{Plan, Settings};
+use nestrad_master::solution::Solution;
+use nestrad_tests::random::{Dice, cheap, scene};
+use nestrad_tests::solving::{coarse, finish};
+use proptest::prelude::*;
+
+const CASES: u32 = 1000;
+
+fn planned(problem: &Problem, settings: &Settings) -> Result<Plan, TestCaseError> {
+    let mut plan = Plan::new(problem, settings).map_err(|e| TestCaseError::fail(e.to_string()))?;
+    cheap(&mut plan);
+    Ok(plan)
+}
+
+fn solved(problem: &Problem) -> Result<Solution, TestCaseError> {
+    by_plan(problem, &planned(problem, &coarse())?)
+}
+
+fn by_plan(problem: &Problem, plan: &Plan) -> Result<Solution, TestCaseError> {
+    let finished = finish(problem, plan).map_err(|e| TestCaseError::fail(e.to_string()))?;
+    Ok(finished.solution)
+}
+
+/// The triangles of a problem dealt anew; `order[k]` is where triangle k comes from. Organs and materials stand
+/// in order of first appearance, as files are read.
+fn dealt(problem: &Problem, order: &[usize]) -> (Problem, Vec<usize>) {
+    let mut other = problem.clone();
+    let (from, to) = (&problem.scene, &mut other.scene);
+    let (mut organs, mut materials) = (Vec::new(), Vec::new());
+    let number = |list: &mut Vec<usize>, of: u32| {
+        let found = list.iter().position(|&k| k == of as usize);
+        found.unwrap_or_else(|| {
+            list.push(of as usize);
+            list.len() - 1
+        }) as u32
+    };
+    for (k, &t) in order.iter().enumerate() {
+        to.triangles[k] = from.triangles[t];
+        to.organ[k] = number(&mut organs, from.organ[t]);
+        to.material[k] = number(&mut materials, from.material[t]);
+    }
+    // materials of no triangle stay at the end
+    for m in 0..from.materials.len() as u32 {
+        number(&mut materials, m);
+    }
+    to.organs = organs.iter().map(|&o| from.organs[o].clone()).collect();
+    to.materials = materials
+        .iter()
+        .map(|&m| from.materials[m].clone())
+        .collect();
+    for (band, was) in other.bands.iter_mut().zip(&problem.bands) {
+        band.materials = materials.iter().map(|&m| was.materials[m]).collect();
+    }
+    (other, organs)
+}
+
+/// A plan like a user's: with rays, probes and elements of its own.
+fn as_a_user_plans(problem: &Problem, diameter: Diameter) -> Result<Plan, TestCaseError> {
+    let settings = Settings {
+        diameter,
+        ..coarse()
+    };
+    let mut plan = planned(problem, &settings)?;
+    if let Some(sampling) = &mut plan.sampling {
+        sampling.least_samples = 8.0;
+    }
+    Ok(plan)
+}
+
+fn permuted(seed: u64, bounded: bool) -> Result<(), TestCaseError> {
+    let problem = scene(seed).problem;
+    let mut dice = Dice(!seed);
+    let mut order: Vec<usize> = (0..problem.scene.triangles.len()).collect();
+    for k in (1..order.len()).rev() {
+        order.swap(k, dice.below(k + 1));
+    }
+    let (other, organs) = dealt(&problem, &order);
+    let diameter = if bounded {
+        Diameter::Metres(0.4)
+    } else {
+        Diameter::Auto
+    };
+    let plan = as_a_user_plans(&problem, diameter)?;
+    let again = as_a_user_plans(&other, diameter)?;
+    prop_assert_eq!(plan.direct_line_area_m2, again.direct_line_area_m2);
+    let (a, b) = (by_plan(&problem, &plan)?, by_plan(&other, &again)?);
+    for (k, &t) in order.iter().enumerate() {
+        prop_assert_eq!(a.triangles[t], b.triangles[k]);
+    }
+    for (k, &o) in organs.iter().enumerate() {
+        prop_assert_eq!(a.organs[o], b.organs[k]);
+    }
+    prop_assert_eq!(a.balance, b.balance);
+    prop_assert_eq!(a.soil, b.soil);
+    Ok(())
+}
+
+/// The direct light of a small organ comes of random rays, which once had the numbers of the input.
+#[test]
+fn a_small_leaf_among_three_gets_its_light_in_any_order() {
+    permuted(556, false).unwrap();
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: CASES, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// Permuting the triangles permutes the results, to the last bit: with lines, rays, probes, far field.
+    #[test]
+    fn permuting_the_input_permutes_the_output(seed: u64, bounded: bool) {
+        permuted(seed, bounded)?;
+    }
+}
+
+/// What rounding and the solver's tolerance (1e-9) may leave, relative to the incoming light.
+const ROUNDING: f64 = 1e-6;
+
+/// No organ is so small that its direct light comes of random rays.
+fn without_probes(problem: &Problem, plan: &Plan) -> bool {
+    let coarsest = plan
+        .direct_line_areas_m2(problem)
+        .into_iter()
+        .fold(0.0, f64::max);
+    let areas = problem.scene.triangles.iter().map(area);
+    areas.into_iter().all(|a| a > 20.0 * coarsest)
+}
+
+/// All organs alike, relative to the incoming light.
+fn alike(seed: u64, a: &Solution, b: &Solution, bound: f64) -> Result<(), TestCaseError> {
+    let incoming = a.balance[0].incoming_W;
+    for (a, b) in a.organs.iter().zip(&b.organs) {
+        let off = (a.absorbed_W - b.absorbed_W).abs();
+        prop_assert!(
+            off <= bound * incoming,
+            "seed {}: {} and {} W of {}",
+            seed,
+            a.absorbed_W,
+            b.absorbed_W,
+            incoming
+        );
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: CASES, failure_persistence: None, ..ProptestConfig::default() })]
+
+    /// A triangle turned over, of a material whose faces are exchanged, has its faces exchanged, and nothing
+    /// else changes. To rounding: its pieces are numbered in another order, so sums are.
+    #[test]
+    fn turning_a_triangle_over_swaps_its_faces(seed: u64) {
+        let problem = scene(seed).problem;
+        let t = Dice(!seed).below(problem.scene.triangles.len());
+        let mut turned = problem.clone();
+        turned.scene.triangles[t].swap(1, 2);
+        turned.scene.materials.push(Material::Named("turned".to_owned()));
+        turned.scene.material[t] = turned.scene.materials.len() as u32 - 1;
+        let LeafOptics { upper, lower } = problem.bands[0].materials[problem.scene.material[t] as usize];
+        turned.bands[0].materials.push(LeafOptics { upper: lower, lower: upper });
+        let plan = planned(&problem, &coarse())?;
+        prop_assume!(without_probes(&problem, &plan));
+        let (a, b) = (by_plan(&problem, &plan)?, by_plan(&turned, &plan)?);
+        alike(seed, &a, &b, ROUNDING)?;
+        let bound = ROUNDING * a.balance[0].incoming_W / a.triangle_area_m2[t];
+        let (a, b) = (&a.triangles[t], &b.triangles[t]);
+        prop_assert!((a.irradiance_upper_W_m2 - b.irradiance_lower_W_m2).abs() <= bound, "seed {}", seed);
+        prop_assert!((a.irradiance_lower_W_m2 - b.irradiance_upper_W_m2).abs() <= bound, "seed {}", seed);
+    }
+
+    /// All of a scene moved, by as much as a map does: the same light, to rounding.
+    #[test]
+    fn a_scene_may_stand_anywhere(seed: u64) {
+        let mut problem = scene(seed).problem;
+        // both places are exact in binary: 2^-30 of a metre is a nanometre
+        let rounded = |v: DVec3| (v * 2f64.powi(30)).round() / 2f64.powi(30);
+        problem.scene.triangles.iter_mut().flatten().for_each(|v| *v = rounded(*v));
+        problem.scene.soil_z_m = problem.scene.soil_z_m.map(|_| -0.0625);
+        if let Some(pattern) = &mut problem.scene.pattern {
+            pattern.size_m = DVec2::new(0.6875, 0.90625);
+        }
+        let mut dice = Dice(!seed);
+        let mut far = || (1e6 * (dice.unit() - 0.5)).round();
+        let by = DVec3::new(far(), far(), far());
+        let mut moved = problem.clone();
+        moved.scene.triangles.iter_mut().flatten().for_each(|v| *v += by);
+        moved.scene.soil_z_m = problem.scene.soil_z_m.map(|z| z + by.z);
+        if let Some(pattern) = &mut moved.scene.pattern {
+            pattern.min_m += by.truncate();
+        }
+        let plan = planned(&problem, &coarse())?;
+        alike(seed, &by_plan(&problem, &plan)?, &by_plan(&moved, &plan)?, ROUNDING)?;
+    }
+
+    /// A leaf of a pattern is the same leaf one pattern on.
+    #[test]
+    fn a_leaf_may_stand_in_any_copy_of_the_pattern(seed: u64) {
+        let problem = scene(seed).problem;
+        let Some(pattern) = problem.scene.pattern else { return Ok(()) };
+        let mut dice = Dice(!seed);
+        let mut moved = problem.clone();
+        for triangle in &mut moved.scene.triangles {
+            let copies = DVec2::new(dice.below(7) as f64 - 3.0, dice.below(7) as f64 - 3.0);
+            triangle.iter_mut().for_each(|v| *v += (copies * pattern.size_m).extend(0.0));
+        }
+        let plan = planned(&problem, &coarse())?;
+        alike(seed, &by_plan(&problem, &plan)?, &by_plan(&moved, &plan)?, ROUNDING)?;
+    }
+
+    /// The same scene written in another unit is the same, to rounding.
+    #[test]
+    fn the_unit_means_nothing(seed: u64) {
+        let problem = scene(seed).problem;
+        let written = |unit: Unit| {
+            let per_metre = unit.per_metre();
+            let from = &problem.scene;
+            let mesh = Mesh {
+                file: "scene.can".to_owned(),
+                triangles: from.triangles.iter().map(|t| t.map(|v| v * per_metre)).collect(),
+                line: (1..=from.triangles.len() as u32).collect(),
+                organ: from.organ.clone(),
+                material: from.material.clone(),
+                organs: from.organs.clone(),
+                materials: from.materials.clone(),
+            };
+            let corners = |p: Pattern| [0.0, 0.0, p.size_m.x * per_metre, p.size_m.y * per_metre];
+            let geometry = Geometry {
+                meshes: vec![mesh],
+                pattern: from.pattern.and_then(|p| Rectangle::from_corners(corners(p))),
+                soil: from.soil_z_m.map(|z| z * per_metre),
+                unit,
+            };
+            let (scene, _) = build_scene(geometry).map_err(|e| TestCaseError::fail(e.to_string()))?;
+            Ok::<_, TestCaseError>(Problem { scene, ..problem.clone() })
+        };
+        let metres = written(Unit::Metre)?;
+        let plan = planned(&metres, &coarse())?;
+        let reference = by_plan(&metres, &plan)?;
+        for unit in [Unit::Centimetre, Unit::Millimetre] {
+            alike(seed, &reference, &by_plan(&written(unit)?, &plan)?, ROUNDING)?;
+        }
+    }
+
+    /// As leaves absorb less and less, their light goes to that of leaves that absorb nothing.
+    #[test]
+    fn light_goes_to_that_of_conservative_leaves(seed: u64) {
+        let mut problem = scene(seed).problem;
+        let loss = [1e-3, 1e-6, 1e-9, 0.0];
+        let first = problem.bands[0].clone();
+        problem.bands = loss.map(|loss| {
+            let mut band = first.clone();
+            for face in band.materials.iter_mut().flat_map(|m| [&mut m.upper, &mut m.lower]) {
+                let all = face.rho + face.tau;
+                let rho = if all > 0.0 { face.rho / all } else { 0.5 };
+                (face.rho, face.tau) = ((1.0 - loss) * rho, (1.0 - loss) * (1.0 - rho));
+            }
+            band
+        }).to_vec();
+        for source in &mut problem.sources {
+            source.irradiance_W_m2 = vec![source.irradiance_W_m2[0]; loss.len()];
+        }
+        let solution = solved(&problem)?;
+        let brightest = solution.organs.iter().map(|i| i.irradiance_upper_W_m2.max(i.irradiance_lower_W_m2)).fold(0.0, f64::max);
+        for organ in solution.organs.chunks_exact(loss.len()) {
+            let limit = organ[loss.len() - 1];
+            prop_assert!(limit.absorbed_W <= 1e-12 * solution.balance[0].incoming_W);
+            for (item, loss) in organ.iter().zip(loss) {
+                let off = (item.irradiance_upper_W_m2 - limit.irradiance_upper_W_m2).abs()
+                    .max((item.irradiance_lower_W_m2 - limit.irradiance_lower_W_m2).abs());
+                // light meets a hundred leaves at most before it is gone
+                prop_assert!(off <= (100.0 * loss + ROUNDING) * brightest, "seed {}: {} of {} at {}", seed, off, brightest, loss);
+            }
+        }
+    }
+
+    /// As the sphere grows, light goes to that without a sphere; beyond all lines of sight it is that, to the bit.
+    #[test]
+    fn light_goes_to_that_without_a_sphere(seed: u64) {
+        let problem = scene(seed).problem;
+        prop_assume!(problem.scene.pattern.is_some());
+        let of = |diameter| by_plan(&problem, &planned(&problem, &Settings { diameter, ..coarse() })?);
+        let whole = of(Diameter::Infinite)?;
+        prop_assert_eq!(&whole, &of(Diameter::Metres(1e9))?);
+        // a line in a hundred is longer than this, a tenth of which is not lost in the far field
+        let large = of(Diameter::Metres(100.0))?;
+        let incoming = whole.balance[0].incoming_W;
+        for (a, b) in whole.organs.iter().zip(&large.organs) {
+            prop_assert!((a.absorbed_W - b.absorbed_W).abs() <= 1e-2 * incoming, "seed {}", seed);
+        }
+    }
+}
