@@ -1,6 +1,8 @@
 //! Wild scenes (`random::wild`): those that the fuzzer found something with, by seed, and a few hundred
 //! as they come.
 
+#![allow(clippy::unwrap_used)]
+
 use nestrad_tests::extremes::run;
 use nestrad_tests::extremes::wild::case;
 
@@ -19,6 +21,22 @@ fn a_low_sun_across_the_corner_of_an_open_scene_takes_bounded_time() {
 #[test]
 fn a_pattern_narrower_than_a_step_of_the_lattice_is_lit() {
     holds(1_000_019);
+}
+
+/// A scene 23 m high on a pattern of 0.03 mm: rays crossed a hundred thousand copies, each for nothing.
+#[test]
+fn a_pattern_a_million_times_as_high_as_wide_is_refused() {
+    let row = run(case(1_000_318));
+    let seen = row.verdict.unwrap();
+    assert_eq!(seen.happens, "refused");
+    assert!(seen.figure.contains("times as high as wide"), "{seen:?}");
+}
+
+/// Elements 175 m long and 1 cm wide along the rows of the lattice: most of them met no line, and what they
+/// scatter, more than half of all light, went nowhere.
+#[test]
+fn long_elements_along_the_rows_of_the_lattice_lose_no_light() {
+    holds(1_000_252);
 }
 
 #[test]

@@ -247,6 +247,17 @@ mod tests {
     }
 
     #[test]
+    fn a_narrow_pattern_has_one_column_of_lines() {
+        let narrow = Extent {
+            min_m: DVec3::ZERO,
+            max_m: DVec3::new(1e-5, 10.0, 0.01),
+            periodic: true,
+        };
+        let l = Lattice::new(DVec3::Z, &narrow, 1e-7, [0.3, 0.3, 0.5]);
+        assert!(l.nx == 1 && (900..1100).contains(&l.ny), "{l:?}");
+    }
+
+    #[test]
     fn the_expected_number_of_lines_is_exact() {
         let n = 2000;
         for (z, area) in [(0.8, 0.013), (0.05, 0.013), (0.05, 0.0007), (1.0, 0.7)] {

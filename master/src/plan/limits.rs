@@ -10,7 +10,8 @@ use super::{PlanError, Scale, Settings};
 /// The accuracy below which the number of directions would pass a million, percent.
 const LEAST_ACCURACY_PERCENT: f64 = 0.01;
 
-/// Most copies of the pattern that one triangle may reach into.
+/// Most copies of the pattern that one triangle may reach into, or a slope of 45 degrees through the scene:
+/// rays go from copy to copy.
 const MOST_PATTERNS: f64 = 1e3;
 
 /// A step in height may be this part of a triangle.
@@ -47,6 +48,21 @@ pub(super) fn check_overhang(problem: &Problem) -> Result<(), PlanError> {
         }
     }
     Ok(())
+}
+
+pub(super) fn check_pattern(problem: &Problem, scale: &Scale) -> Result<(), PlanError> {
+    let Some(pattern) = problem.scene.pattern else {
+        return Ok(());
+    };
+    let (height_m, width_m) = (scale.height_m, pattern.size_m.min_element());
+    if height_m <= MOST_PATTERNS * width_m {
+        return Ok(());
+    }
+    Err(PlanError::Narrow {
+        height_m,
+        width_m,
+        most: MOST_PATTERNS,
+    })
 }
 
 pub(super) fn check_height(scale: &Scale) -> Result<(), PlanError> {

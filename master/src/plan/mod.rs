@@ -125,6 +125,18 @@ pub enum PlanError {
         /// Most copies.
         most: f64,
     },
+    /// A pattern that light crosses too often on its way.
+    #[error(
+        "the scene, soil included, is {height_m:.1e} m high on a pattern {width_m:.1e} m wide, expected at most {most:.0e} times as high as wide: is the unit right?"
+    )]
+    Narrow {
+        /// From the lowest to the highest point.
+        height_m: f64,
+        /// The shorter side of the pattern.
+        width_m: f64,
+        /// Most times as high as wide.
+        most: f64,
+    },
     /// Leaves that cannot be told apart in height.
     #[error(
         "the scene, soil included, is {height_m:.3e} m high, which resolves heights to {step_m:.1e} m only, against triangles of {triangle_m:.1e} m: is the height of the soil right?"
@@ -168,6 +180,7 @@ impl Plan {
         limits::check_accuracy(settings)?;
         limits::check_overhang(problem)?;
         let scale = Scale::of(problem);
+        limits::check_pattern(problem, &scale)?;
         limits::check_height(&scale)?;
         let has_soil = problem.scene.soil_z_m.is_some();
         let lit = |b: usize| problem.sources.iter().any(|s| s.irradiance_W_m2[b] > 0.0);

@@ -33,6 +33,10 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced
     let plan = Plan {
         rays,
         batch: batch.index,
+        in_a_row_m: match batch.lines.first() {
+            Some(lines) => IN_A_ROW * lines.line_area_m2.sqrt(),
+            None => f64::INFINITY,
+        },
     };
     let part = Part::new(rays.part, rays.parts);
     let triangles = part.of(block.soup.triangles().len());
@@ -57,12 +61,19 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &v1::Batch, traced
 struct Plan<'a> {
     rays: &'a v1::Rays,
     batch: u32,
+    /// What is longer than this is met by several lines at a time.
+    in_a_row_m: f64,
 }
 
+/// Up to so many lines in a row are as good as lines here and there.
+const IN_A_ROW: f64 = 4.0;
+
 impl Plan<'_> {
-    /// Rays in this batch for a face of that area: those of the half are dealt out in turn.
-    fn rays_of(&self, area_m2: f64, face: u32) -> u32 {
-        let missing = (self.rays.least_samples - area_m2 * self.rays.lines_per_m2)
+    /// Rays in this batch for a face of that area and that longest edge: those of the half are dealt out in
+    /// turn. What is long is met by many lines of a lattice at a time, if by any: these are one sample.
+    fn rays_of(&self, area_m2: f64, longest_m: f64, face: u32) -> u32 {
+        let at_a_time = (longest_m / self.in_a_row_m).max(1.0);
+        let missing = (self.rays.least_samples - area_m2 * self.rays.lines_per_m2 / at_a_time)
             .ceil()
             .max(0.0) as u32;
         let batches = self.rays.batches_in_half.max(1);
@@ -87,6 +98,8 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
         return;
     };
     let n = block.divisions[t];
+    let [a, b, c] = triangle;
+    let longest_m = a.distance(*b).max(b.distance(*c)).max(c.distance(*a)) / f64::from(n);
     for local in block.first[t]..block.first[t + 1] {
         for side in 0..2 {
             let face = 2 * local + side;
@@ -94,7 +107,7 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
             if !block.has_row(face) {
                 continue;
             }
-            let count = plan.rays_of(block.area_m2[local as usize], global);
+            let count = plan.rays_of(block.area_m2[local as usize], longest_m, global);
             if count == 0 {
                 continue;
             }
@@ -131,7 +144,11 @@ fn from_soil(
         if !block.has_row(row) {
             continue;
         }
-        let count = plan.rays_of(soil.cell_m.x * soil.cell_m.y, end);
+        let count = plan.rays_of(
+            soil.cell_m.x * soil.cell_m.y,
+            soil.cell_m.max_element(),
+            end,
+        );
         let mut rng = plan.numbers(end);
         let corner = DVec2::new(
             f64::from(cell % soil.cells[0]),

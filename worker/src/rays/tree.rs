@@ -40,7 +40,7 @@ pub(super) struct Tree {
     centre: DVec3,
     z_min_m: f64,
     z_max_m: f64,
-    /// What lies closer together than this touches, metres.
+    /// What lies closer together than this touches, metres, where it is near the ray's origin.
     pub(super) touch_m: f64,
 }
 
@@ -64,9 +64,12 @@ const HALF_EXTENT: f64 = 1e4;
 /// half extent.
 const ROUNDINGS: f64 = 6.0;
 
-/// Two surfaces touch when they are closer than this part of the scene's extent: rounding in f64 says
-/// nothing of which is nearer. Then they lie as the lines have them, by rising number from below.
-const TOUCH: f64 = 1e-12;
+/// Two surfaces touch when they are closer than this part of the largest coordinate and of the distance along
+/// the ray together: rounding in f64 says nothing of which is nearer. A point within a triangle is rounded
+/// four times, a copy one pattern away once by its user and once here, each in three coordinates by at most
+/// half a unit in the last place: 6 sqrt(3) < 12 halves. Where such surfaces lie in one plane they lie as the
+/// lines have them, by rising number from below.
+const TOUCH: f64 = 12.0 * 0.5 * f64::EPSILON;
 
 /// A ray that has crossed this many patterns without a hit is taken to leave the canopy sideways.
 const MOST_PATTERNS: usize = 100_000;
@@ -204,8 +207,16 @@ impl Tree {
                     let slack = self.touch_in_t(vertices_m, ray.direction, hit.t);
                     if hit.t.abs() <= slack {
                         // it touches what the ray leaves
-                        let above = ray.source.is_none_or(|t| place > (t, [0, 0]));
-                        if above != up {
+                        let ahead = match ray.source {
+                            Some(source) => {
+                                let moved = vertices_m.map(|v| v + block.shift_m(away));
+                                let left = &block.soup.triangles()[source as usize];
+                                self.passes(&moved, left, ray.direction)
+                                    .unwrap_or((place > (source, [0, 0])) == up)
+                            }
+                            None => up,
+                        };
+                        if !ahead {
                             continue;
                         }
                         hit.t = 0.0;
@@ -237,15 +248,32 @@ impl Tree {
         best.map(|hit| (hit.t, hit.face))
     }
 
+    /// Whether a ray passes a triangle on its way from a triangle `left` that touches it: it does when it
+    /// leaves the side on which `left` stands, as at an edge that the two share. `None` if they lie in one plane.
+    fn passes(&self, triangle: &[DVec3; 3], left: &[DVec3; 3], direction: DVec3) -> Option<bool> {
+        let normal = geometry::doubled_area_vector(triangle);
+        let stands = |v: &DVec3| normal.dot(*v - triangle[0]);
+        let sides = left.each_ref().map(stands);
+        let side = sides.into_iter().fold(
+            0.0,
+            |far: f64, side| {
+                if side.abs() > far.abs() { side } else { far }
+            },
+        );
+        let in_plane = side.abs() <= 2.0 * self.touch_m * normal.length();
+        (!in_plane).then(|| side * normal.dot(direction) < 0.0)
+    }
+
     /// How far apart along a ray two surfaces like this one may be met and still touch.
     fn touch_in_t(&self, triangle: &[DVec3; 3], direction: DVec3, t: f64) -> f64 {
+        let touch_m = self.touch_m + TOUCH * t.abs();
         // far beyond any rounding no cosine need be known
         if t.abs() > self.touch_m / SMALLEST_COSINE {
-            return self.touch_m;
+            return touch_m;
         }
         let normal = geometry::doubled_area_vector(triangle);
         let cosine = (normal.dot(direction) / normal.length()).abs();
-        self.touch_m / cosine.max(SMALLEST_COSINE)
+        touch_m / cosine.max(SMALLEST_COSINE)
     }
 }
 
