@@ -127,7 +127,7 @@ pub enum PlanError {
     },
     /// A pattern that light crosses too often on its way.
     #[error(
-        "the scene, soil included, is {height_m:.1e} m high on a pattern {width_m:.1e} m wide, expected at most {most:.0e} times as high as wide: is the unit right?"
+        "the scene, soil included, is {height_m:.1e} m high on a pattern {width_m:.1e} m wide, expected at most {most:.0e} times as high as wide: are the unit and the height of the soil right?"
     )]
     Narrow {
         /// From the lowest to the highest point.
@@ -180,8 +180,8 @@ impl Plan {
         limits::check_accuracy(settings)?;
         limits::check_overhang(problem)?;
         let scale = Scale::of(problem);
-        limits::check_pattern(problem, &scale)?;
         limits::check_height(&scale)?;
+        limits::check_pattern(problem, &scale)?;
         let has_soil = problem.scene.soil_z_m.is_some();
         let lit = |b: usize| problem.sources.iter().any(|s| s.irradiance_W_m2[b] > 0.0);
         let scattering_bands: Vec<usize> = (0..problem.bands.len())

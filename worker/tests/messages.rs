@@ -1,0 +1,67 @@
+//! Blocks as raw bytes: whatever comes is refused or taken, and what is taken holds together.
+
+#![allow(clippy::unwrap_used)]
+
+use nestrad_proto::v1;
+use nestrad_worker::Block;
+use proptest::prelude::*;
+use prost::Message;
+
+fn block() -> v1::Block {
+    let vector = |x, y, z| Some(v1::Vector { x, y, z });
+    v1::Block {
+        world: Some(v1::World {
+            min_m: vector(0.0, 0.0, 0.0),
+            max_m: vector(1.0, 1.0, 1.0),
+            periodic: true,
+            elements: 5,
+            soil: Some(v1::SoilPlane {
+                z_m: 0.0,
+                cell_x_m: 0.5,
+                cell_y_m: 0.5,
+                cells_x: 2,
+                cells_y: 2,
+                ..v1::SoilPlane::default()
+            }),
+            sphere_radius_m: 0.4,
+            far_levels: 5,
+            far_bins: 3,
+        }),
+        vertices_m: (0..18).map(|k| f64::from(k * 7 % 18) / 18.0).collect(),
+        first_element: vec![0, 4],
+        divisions: vec![2, 1],
+        solid: vec![false, true],
+        owned: vec![true, false],
+        owned_soil_cells: vec![0, 3],
+    }
+}
+
+#[test]
+fn the_block_is_taken_as_it_is() {
+    assert!(Block::new(&block()).is_ok());
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 4096, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn blocks_with_a_few_wrong_bytes_are_refused_or_taken(
+        wrong in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..6),
+    ) {
+        let mut bytes = block().encode_to_vec();
+        for (at, byte) in wrong {
+            let at = at.index(bytes.len());
+            bytes[at] = byte;
+        }
+        if let Ok(message) = v1::Block::decode(&bytes[..]) && let Ok(taken) = Block::new(&message) {
+            prop_assert!(taken.ends() >= 4);
+        }
+    }
+
+    #[test]
+    fn any_bytes_are_refused_or_taken(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
+        if let Ok(message) = v1::Block::decode(&bytes[..]) {
+            let _ = Block::new(&message);
+        }
+    }
+}
