@@ -14,6 +14,7 @@
 pub mod adding;
 pub mod calls;
 pub mod canopies;
+pub mod chart;
 pub mod crew;
 pub mod desk;
 pub mod enclosure;
