@@ -39,18 +39,12 @@ fn long_elements_along_the_rows_of_the_lattice_lose_no_light() {
     holds(1_000_252);
 }
 
-/// A sun a hundredth of a degree high over open soil, in which most leaves lie buried.
+/// A sun a hundredth of a degree high over open soil, 123 m above the deepest of the leaves that lie buried in it:
+/// the box of its lattice is dragged out by that depth, so hardly a line meets what lies above.
 #[test]
 #[ignore = "open: two thirds of the incoming light are not accounted for, and not in the stated error"]
 fn a_sun_on_the_horizon_of_open_soil_with_buried_leaves_balances() {
     holds(2_000_645);
-}
-
-/// Found on a busy machine; on an idle one it may well end in time.
-#[test]
-#[ignore = "open: no end within 120 s on a busy machine, cause not looked into"]
-fn a_scene_that_took_too_long_ends_in_time() {
-    holds(2_000_404);
 }
 
 #[test]
