@@ -1,45 +1,99 @@
 //! Packed rows: the form in which rows travel and are kept; see `RowsHeader` in `worker.proto`.
 //!
-//! A job of few lines gives most rows nothing, so empty rows cost nothing, and a row of one entry costs
-//! a byte more than the entry.
-
-use std::ops::Range;
+//! What two rows see of each other along a line is one pair, which is packed once. Pairs stand by row, and
+//! faces that see each other have numbers close together as a rule: so both are packed as differences.
 
 use thiserror::Error;
 
-use crate::v1;
+use crate::bits::{Reader, Writer};
 
-/// Bytes that an entry takes where there are that many ends.
-pub fn end_bytes(ends: usize) -> usize {
-    let largest = ends.saturating_sub(1) as u64;
-    (1..4).find(|&b| largest >> (8 * b) == 0).unwrap_or(4)
+/// A row, and what it sees: of a mutual pair a row that is not behind it, of a single one an end.
+pub type Pair = (u32, u32);
+
+/// Fewest bits of a pair, and most.
+const LEAST_BITS: u64 = 6;
+const MOST_BITS: u64 = 2 * 31 + 1 + 5 + 31;
+
+/// Two counts of at most 10 bytes, and what is left empty in two last bytes.
+const MOST_HEAD: u64 = 22;
+
+/// Most bytes that so many entries can take: a limit before memory is taken.
+pub fn most_bytes(entries: u64) -> u64 {
+    MOST_HEAD + entries.saturating_mul(MOST_BITS).div_ceil(8)
 }
 
-/// Most bytes that these rows can take: a limit before memory is taken.
-pub fn most_bytes(rows: u64, entries: u64, end_bytes: usize) -> u64 {
-    entries * end_bytes as u64 + 10 * rows.min(entries)
+/// Most entries that so many bytes can hold.
+pub fn most_entries(bytes: u64) -> u64 {
+    bytes.saturating_mul(8) / LEAST_BITS * 2
 }
 
-/// Packs rows; entries are below `1 << (8 * end_bytes)`.
-pub fn pack(rows: &v1::Rows, end_bytes: usize) -> Vec<u8> {
-    let mut packed = Vec::with_capacity(rows.ends.len() * (end_bytes + 1));
-    let (mut empty, mut at) = (0, 0);
-    for &length in &rows.lengths {
-        if length == 0 {
-            empty += 1;
-            continue;
-        }
-        put_varint(&mut packed, 2 * empty + u64::from(length > 1));
-        if length > 1 {
-            put_varint(&mut packed, u64::from(length - 2));
-        }
-        for end in &rows.ends[at..at + length as usize] {
-            packed.extend_from_slice(&end.to_le_bytes()[..end_bytes]);
-        }
-        at += length as usize;
-        empty = 0;
+/// Packs pairs as they come: those of each kind by rising row, and within a row by falling number of what
+/// is seen.
+#[derive(Debug)]
+pub struct Packer {
+    mutual: List,
+    single: List,
+    /// The largest end.
+    top: u32,
+}
+
+#[derive(Debug, Default)]
+struct List {
+    bits: Writer,
+    pairs: u64,
+    /// The pair before.
+    last: Option<Pair>,
+}
+
+impl List {
+    fn push(&mut self, (row, seen): Pair, top: u32) {
+        let (rows, from) = match self.last {
+            Some((last, before)) if last == row => (0, before),
+            Some((last, _)) => (row - last, top),
+            None => (row, top),
+        };
+        self.bits.put_gamma(rows);
+        self.bits.put_classed(from - seen);
+        self.last = Some((row, seen));
+        self.pairs += 1;
     }
-    packed
+}
+
+impl Packer {
+    /// For a world of so many ends, at least 1.
+    pub fn new(ends: usize) -> Self {
+        Self {
+            mutual: List::default(),
+            single: List::default(),
+            top: ends.saturating_sub(1) as u32,
+        }
+    }
+
+    /// Two rows that see each other's ends; the second is not larger than the first.
+    pub fn mutual(&mut self, row: u32, other: u32) {
+        self.mutual.push((row, other), row);
+    }
+
+    /// A row that sees an end.
+    pub fn single(&mut self, row: u32, end: u32) {
+        self.single.push((row, end), self.top);
+    }
+
+    /// Entries of all rows so far.
+    pub fn entries(&self) -> u64 {
+        2 * self.mutual.pairs + self.single.pairs
+    }
+
+    /// The packed rows.
+    pub fn finish(self) -> Vec<u8> {
+        let mut packed = Vec::new();
+        for list in [&self.mutual, &self.single] {
+            put_varint(&mut packed, list.pairs);
+        }
+        packed.extend(self.mutual.bits.finish());
+        packed.extend(self.single.bits.finish());
+        packed
+    }
 }
 
 /// Why packed rows cannot be read.
@@ -61,125 +115,95 @@ pub enum PackedFault {
         /// How many there should be.
         expected: u64,
     },
-    /// An entry stands for nothing that there is.
-    #[error("packed rows see end {end}, there are {ends}")]
-    End {
-        /// The entry.
-        end: u32,
-        /// Number of ends.
-        ends: u32,
-    },
 }
 
-/// Calls `row` with the number of each row that has entries, and the bytes of these.
-pub fn for_each_row<'a>(
-    packed: &'a [u8],
-    end_bytes: usize,
-    mut row: impl FnMut(u64, &'a [u8]) -> Result<(), PackedFault>,
+/// How many rows a block has, and how many ends its world.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Shape {
+    /// Rows of the block, empty ones included.
+    pub rows: u32,
+    /// Ends of the world.
+    pub ends: u32,
+}
+
+/// Calls `pair` with every pair, and whether it is mutual. Nothing that is read is trusted: rows and ends are
+/// within the shape.
+pub fn for_each_pair(
+    packed: &[u8],
+    shape: Shape,
+    mut pair: impl FnMut(u32, u32, bool),
 ) -> Result<(), PackedFault> {
-    let (mut at, mut number) = (0, 0u64);
-    while at < packed.len() {
-        let head = take_varint(packed, &mut at)?;
-        let length = if head % 2 == 0 {
-            1
-        } else {
-            take_varint(packed, &mut at)? + 2
+    let mut at = 0;
+    let mutual = take_varint(packed, &mut at)?;
+    let single = take_varint(packed, &mut at)?;
+    let mut bits = Reader::new(&packed[at..]);
+    read(&mut bits, mutual, shape, |row| row, |a, b| pair(a, b, true))?;
+    bits.align();
+    let top = shape.ends.checked_sub(1).ok_or(PackedFault::Number)?;
+    read(&mut bits, single, shape, |_| top, |a, b| pair(a, b, false))?;
+    bits.align();
+    if bits.is_at_end() {
+        return Ok(());
+    }
+    Err(PackedFault::Count {
+        what: "bytes",
+        found: packed.len() as u64,
+        expected: (at + bits.taken_bytes()) as u64,
+    })
+}
+
+/// Reads so many pairs; `top` gives the largest number that can be seen by a row.
+#[inline]
+fn read(
+    bits: &mut Reader,
+    pairs: u64,
+    shape: Shape,
+    top: impl Fn(u32) -> u32,
+    mut pair: impl FnMut(u32, u32),
+) -> Result<(), PackedFault> {
+    let (mut row, mut seen, mut first) = (0u32, 0u32, true);
+    for _ in 0..pairs {
+        let Some(rows) = bits.take_gamma() else {
+            let cut_off = bits.nears_end();
+            return Err(if cut_off {
+                PackedFault::CutOff
+            } else {
+                PackedFault::Number
+            });
         };
-        number += head / 2;
-        let bytes = length * end_bytes as u64;
-        let left = (packed.len() - at) as u64;
-        if bytes > left {
+        if first || rows > 0 {
+            row = row.checked_add(rows).ok_or(PackedFault::Number)?;
+            if row >= shape.rows {
+                return Err(PackedFault::Count {
+                    what: "rows",
+                    found: u64::from(row) + 1,
+                    expected: u64::from(shape.rows),
+                });
+            }
+            seen = top(row);
+            first = false;
+        }
+        let less = bits.take_classed();
+        if bits.is_beyond_end() {
             return Err(PackedFault::CutOff);
         }
-        row(number, &packed[at..at + bytes as usize])?;
-        at += bytes as usize;
-        number += 1;
+        seen = seen.checked_sub(less).ok_or(PackedFault::Number)?;
+        pair(row, seen);
     }
     Ok(())
 }
 
-/// The entries in the bytes of a row.
-pub fn entries(bytes: &[u8], end_bytes: usize) -> impl Iterator<Item = u32> {
-    bytes.chunks_exact(end_bytes).map(|b| {
-        let mut end = [0; 4];
-        end[..b.len()].copy_from_slice(b);
-        u32::from_le_bytes(end)
-    })
-}
-
-/// Checks that packed rows are what they should be: nothing in them is trusted.
-pub fn check(packed: &[u8], rows: u64, expected: u64, ends: u32) -> Result<(), PackedFault> {
-    let end_bytes = end_bytes(ends as usize);
+/// Checks that packed rows are what they should be.
+pub fn check(packed: &[u8], shape: Shape, expected: u64) -> Result<(), PackedFault> {
     let mut found = 0;
-    for_each_row(packed, end_bytes, |row, bytes| {
-        if row >= rows {
-            return Err(PackedFault::Count {
-                what: "rows",
-                found: row + 1,
-                expected: rows,
-            });
-        }
-        found += (bytes.len() / end_bytes) as u64;
-        match entries(bytes, end_bytes).find(|&end| end >= ends) {
-            Some(end) => Err(PackedFault::End { end, ends }),
-            None => Ok(()),
-        }
-    })?;
+    for_each_pair(packed, shape, |_, _, mutual| found += 1 + u64::from(mutual))?;
     if found == expected {
-        Ok(())
-    } else {
-        Err(PackedFault::Count {
-            what: "entries",
-            found,
-            expected,
-        })
+        return Ok(());
     }
-}
-
-/// Joins the rows of several jobs, row by row, in the order of the jobs.
-pub fn join(jobs: &[&[u8]], rows: usize, end_bytes: usize) -> Result<v1::Rows, PackedFault> {
-    let mut lengths = vec![0u32; rows];
-    let place = |number: u64| -> Result<usize, PackedFault> {
-        let found = number + 1;
-        if number < rows as u64 {
-            return Ok(number as usize);
-        }
-        Err(PackedFault::Count {
-            what: "rows",
-            found,
-            expected: rows as u64,
-        })
-    };
-    for job in jobs {
-        for_each_row(job, end_bytes, |row, bytes| {
-            let length = &mut lengths[place(row)?];
-            let more = (bytes.len() / end_bytes) as u32;
-            *length = length.checked_add(more).ok_or(PackedFault::Number)?;
-            Ok(())
-        })?;
-    }
-    let mut next: Vec<usize> = Vec::with_capacity(rows);
-    let mut total = 0;
-    for &length in &lengths {
-        next.push(total);
-        total += length as usize;
-    }
-    let mut ends = vec![0u32; total];
-    for job in jobs {
-        for_each_row(job, end_bytes, |row, bytes| {
-            let at = &mut next[place(row)?];
-            let range: Range<usize> = *at..*at + bytes.len() / end_bytes;
-            *at = range.end;
-            for (to, end) in ends[range].iter_mut().zip(entries(bytes, end_bytes)) {
-                *to = end;
-            }
-            Ok(())
-        })?;
-    }
-    Ok(v1::Rows {
-        lengths,
-        ends,
-        ..v1::Rows::default()
+    Err(PackedFault::Count {
+        what: "entries",
+        found,
+        expected,
     })
 }
 
@@ -191,10 +215,10 @@ fn put_varint(to: &mut Vec<u8>, mut number: u64) {
     to.push(number as u8);
 }
 
-/// A number below 2^35: no row is longer, and no more rows are empty.
+/// A number below 2^42: no job has more pairs.
 fn take_varint(from: &[u8], at: &mut usize) -> Result<u64, PackedFault> {
     let mut number = 0;
-    for shift in (0..35).step_by(7) {
+    for shift in (0..42).step_by(7) {
         let byte = *from.get(*at).ok_or(PackedFault::CutOff)?;
         *at += 1;
         number |= u64::from(byte & 0x7f) << shift;
@@ -211,84 +235,91 @@ mod tests {
 
     use super::*;
 
-    fn rows(lists: &[Vec<u32>]) -> v1::Rows {
-        v1::Rows {
-            lengths: lists.iter().map(|l| l.len() as u32).collect(),
-            ends: lists.concat(),
-            ..v1::Rows::default()
-        }
+    const SHAPE: Shape = Shape {
+        rows: 50_000,
+        ends: 70_000,
+    };
+
+    fn pack(mutual: &[Pair], single: &[Pair], ends: u32) -> Vec<u8> {
+        let mut packer = Packer::new(ends as usize);
+        mutual.iter().for_each(|&(a, b)| packer.mutual(a, b));
+        single.iter().for_each(|&(a, b)| packer.single(a, b));
+        packer.finish()
+    }
+
+    fn unpack(packed: &[u8], shape: Shape) -> Result<[Vec<Pair>; 2], PackedFault> {
+        let (mut mutual, mut single) = (Vec::new(), Vec::new());
+        for_each_pair(packed, shape, |a, b, both| {
+            let list = if both { &mut mutual } else { &mut single };
+            list.push((a, b));
+        })?;
+        Ok([mutual, single])
     }
 
     #[test]
-    fn an_entry_takes_as_many_bytes_as_it_needs() {
-        let needed: Vec<usize> = [1, 256, 257, 1 << 16, (1 << 16) + 1, 1 << 24, (1 << 24) + 1]
-            .iter()
-            .map(|&ends| end_bytes(ends))
-            .collect();
-        assert_eq!(needed, [1, 1, 2, 2, 3, 3, 4]);
-    }
-
-    #[test]
-    fn empty_rows_cost_nothing() {
-        let mut lists = vec![Vec::new(); 1000];
-        lists[60] = vec![9];
-        assert_eq!(pack(&rows(&lists), 3).len(), 4);
+    fn neighbours_take_little_room() {
+        let neighbours: Vec<Pair> = (1..=1000).map(|row| (row, row - 1)).collect();
+        let sky: Vec<Pair> = (0..1000).map(|row| (row, 1002)).collect();
+        // a row further on 3 bits, a number 5 and as many as it needs
+        let bytes = pack(&neighbours, &sky, 1003).len();
+        assert_eq!(bytes, 4 + (8 * 1000 + 1000) / 8 + (8 * 1000 - 2) / 8 + 1);
     }
 
     #[test]
     fn what_does_not_fit_is_refused() {
-        let lists = [vec![1], vec![], vec![2, 3, 4]];
-        let packed = pack(&rows(&lists), 1);
-        assert_eq!(check(&packed, 3, 4, 5), Ok(()));
-        assert!(matches!(
-            check(&packed, 2, 4, 5),
-            Err(PackedFault::Count { what: "rows", .. })
-        ));
-        assert!(matches!(
-            check(&packed, 3, 5, 5),
-            Err(PackedFault::Count {
-                what: "entries",
-                ..
-            })
-        ));
-        assert_eq!(
-            check(&packed, 3, 4, 4),
-            Err(PackedFault::End { end: 4, ends: 4 })
-        );
-        assert_eq!(
-            check(&packed[..packed.len() - 1], 3, 4, 5),
-            Err(PackedFault::CutOff)
-        );
-        assert_eq!(check(&[0x80; 9], 3, 4, 5), Err(PackedFault::Number));
+        let packed = pack(&[(0, 0), (2, 1)], &[(2, 4)], 5);
+        let shape = Shape { rows: 3, ends: 5 };
+        assert_eq!(check(&packed, shape, 5), Ok(()));
+        let few = Shape { rows: 2, ends: 5 };
+        let fault = |what| move |f: &PackedFault| matches!(f, PackedFault::Count { what: w, .. } if *w == what);
+        assert!(check(&packed, few, 5).is_err_and(|f| fault("rows")(&f)));
+        assert!(check(&packed, shape, 4).is_err_and(|f| fault("entries")(&f)));
+        let mut long = packed.clone();
+        long.push(0);
+        assert!(check(&long, shape, 5).is_err_and(|f| fault("bytes")(&f)));
+        let cut = check(&packed[..packed.len() - 1], shape, 5);
+        assert_eq!(cut, Err(PackedFault::CutOff));
+        // row 2 sees an end below the first
+        let below = pack(&[], &[(2, 0)], 6);
+        assert_eq!(check(&below, shape, 1), Err(PackedFault::Number));
+        assert_eq!(check(&[0x80; 9], shape, 1), Err(PackedFault::Number));
+        assert_eq!(check(&[], shape, 0), Err(PackedFault::CutOff));
+        assert_eq!(check(&[0, 0], shape, 0), Ok(()));
     }
 
     proptest! {
         #[test]
-        fn rows_of_jobs_are_joined_in_order(
-            jobs in prop::collection::vec(
-                prop::collection::vec(prop::collection::vec(0u32..70_000, 0..4), 12), 0..5),
+        fn pairs_come_back(
+            mut mutual in prop::collection::vec((0..SHAPE.rows, 0..SHAPE.rows), 0..50),
+            mut single in prop::collection::vec((0..SHAPE.rows, 0..SHAPE.ends), 0..50),
         ) {
-            let ends = 70_000;
-            let bytes = end_bytes(ends);
-            let packed: Vec<Vec<u8>> = jobs.iter().map(|j| pack(&rows(j), bytes)).collect();
-            for (packed, job) in packed.iter().zip(&jobs) {
-                let entries = job.iter().map(Vec::len).sum::<usize>() as u64;
-                prop_assert_eq!(check(packed, 12, entries, ends as u32), Ok(()));
-                prop_assert!(packed.len() as u64 <= most_bytes(12, entries, bytes));
+            for pair in &mut mutual {
+                *pair = (pair.0.max(pair.1), pair.0.min(pair.1));
             }
-            let parts: Vec<&[u8]> = packed.iter().map(Vec::as_slice).collect();
-            let expected: Vec<Vec<u32>> =
-                (0..12).map(|r| jobs.iter().flat_map(|j| j[r].clone()).collect()).collect();
-            prop_assert_eq!(join(&parts, 12, bytes), Ok(rows(&expected)));
+            for list in [&mut mutual, &mut single] {
+                list.sort_by_key(|&(row, seen)| (row, !seen));
+            }
+            let packed = pack(&mutual, &single, SHAPE.ends);
+            let entries = (2 * mutual.len() + single.len()) as u64;
+            prop_assert_eq!(check(&packed, SHAPE, entries), Ok(()));
+            prop_assert!(packed.len() as u64 <= most_bytes(entries));
+            prop_assert!(entries <= most_entries(packed.len() as u64));
+            prop_assert_eq!(unpack(&packed, SHAPE), Ok([mutual, single]));
         }
 
         #[test]
-        fn any_bytes_are_read_or_refused(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
-            for width in 1..=4 {
-                let _ = for_each_row(&bytes, width, |_, _| Ok(()));
+        fn any_bytes_are_read_or_refused(
+            mut bytes in prop::collection::vec(any::<u8>(), 0..200),
+            counts in (0u8..100, 0u8..100),
+        ) {
+            let _ = check(&bytes, SHAPE, 10);
+            if let [mutual, single, ..] = &mut bytes[..] {
+                (*mutual, *single) = counts;
             }
-            let _ = check(&bytes, 10, 10, 1000);
-            let _ = join(&[&bytes], 10, 2);
+            if let Ok([mutual, single]) = unpack(&bytes, SHAPE) {
+                prop_assert!(mutual.iter().all(|&(a, b)| b <= a && a < SHAPE.rows));
+                prop_assert!(single.iter().all(|&(a, b)| a < SHAPE.rows && b < SHAPE.ends));
+            }
         }
     }
 }

@@ -2,7 +2,6 @@
 
 use std::net::SocketAddr;
 
-use nestrad_proto::packed;
 use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
 use nestrad_proto::v1::{
     self, FetchBlockRequest, GiveBackRequest, JoinRequest, LeaseRequest, LeasedJob, RenewRequest,
@@ -104,23 +103,21 @@ impl Rogue {
         let message = v1::Block::decode(&bytes.unwrap()[..]).unwrap();
         let block = nestrad_worker::Block::new(&message).unwrap();
         let tracer = nestrad_worker::Tracer::new(&block);
-        let rows = nestrad_worker::trace(&block, &tracer, job.batch.as_ref().unwrap());
-        let end_bytes = packed::end_bytes(block.ends());
-        let packed = packed::pack(&rows, end_bytes);
+        let batch = job.batch.as_ref().unwrap();
+        let rows = nestrad_worker::trace_packed(&block, || &tracer, batch);
         let header = RowsHeader {
             worker_id: self.id,
             lease_id: job.lease_id,
-            packed_bytes: packed.len() as u64,
-            checksum: blake3::hash(&packed).as_bytes().to_vec(),
-            rows: rows.lengths.len() as u32,
-            entries: rows.ends.len() as u64,
-            end_bytes: end_bytes as u32,
+            packed_bytes: rows.packed.len() as u64,
+            checksum: blake3::hash(&rows.packed).as_bytes().to_vec(),
+            rows: rows.rows,
+            entries: rows.entries,
             lines: rows.lines,
             segments: rows.segments,
             rays: rows.rays,
             compute_s: 0.1,
         };
-        (header, packed)
+        (header, rows.packed)
     }
 
     /// Returns a result; whether it was of use.

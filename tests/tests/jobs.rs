@@ -69,8 +69,7 @@ fn by_jobs(
             .filter(|(_, j)| j.block == block)
         {
             let batch = job.message(&batches[job.batch as usize]);
-            let rows = nestrad_worker::trace(&geometry, &tracer, &batch);
-            let rows = JobRows::pack(&rows, world.ends.len());
+            let rows: JobRows = nestrad_worker::trace_packed(&geometry, || &tracer, &batch).into();
             assembly.put(k, rows.clone()).unwrap();
             assembly.put(k, rows).unwrap();
         }

@@ -60,9 +60,9 @@ pub enum BlockFault {
         /// What is listed.
         what: &'static str,
         /// How many there are.
-        found: usize,
+        found: u64,
         /// How many there should be.
-        expected: usize,
+        expected: u64,
     },
     /// A number is out of its range.
     #[error("block with {what} out of range")]
@@ -94,44 +94,43 @@ impl Block {
             far_bins: world.far_bins,
         };
 
-        let count = block.divisions.len();
-        same_length("vertex coordinates", block.vertices_m.len(), 9 * count)?;
-        same_length("first elements", block.first_element.len(), count)?;
-        same_length("owner flags", block.owned.len(), count)?;
-        same_length("solid flags", block.solid.len(), count)?;
-        require(block.vertices_m.iter().all(|x| x.is_finite()), "vertices_m")?;
-        let triangles: Vec<[DVec3; 3]> = block
-            .vertices_m
-            .chunks_exact(9)
-            .map(|c| [0, 3, 6].map(|k| DVec3::new(c[k], c[k + 1], c[k + 2])))
-            .collect();
+        let triangles = triangles(&block.vertices_m, &block.corners)?;
+        let count = triangles.len();
+        let listed = block.runs.iter().map(|run| u64::from(run.triangles)).sum();
+        same_length("triangles in runs", listed, count as u64)?;
+        let mut divisions = Vec::with_capacity(count);
 
         let mut first = Vec::with_capacity(count + 1);
         let (mut seen_as, mut solid, mut area_m2, mut row) =
             (Vec::new(), Vec::new(), Vec::new(), Vec::new());
         let mut rows = 0;
-        let mut next = 0;
-        for (t, &n) in block.divisions.iter().enumerate() {
-            let start = block.first_element[t];
+        let mut next = 0u32;
+        for run in &block.runs {
+            let n = run.divisions;
             require(
                 (1..=nestrad_common::elements::MAX_DIVISIONS).contains(&n),
                 "divisions",
             )?;
-            require(
-                start >= next && u64::from(start) + u64::from(n * n) <= u64::from(world.elements),
-                "first_element",
-            )?;
-            next = start + n * n;
-            first.push(area_m2.len() as u32);
-            let area = geometry::area(&triangles[t]) / f64::from(n * n);
-            for e in start..next {
-                area_m2.push(area);
-                solid.push(block.solid[t]);
-                seen_as.extend([2 * e, 2 * e + 1]);
-                for _ in 0..2 {
-                    row.push(if block.owned[t] { rows } else { NO_ROW });
-                    rows += u32::from(block.owned[t]);
+            let end = u64::from(next)
+                + u64::from(run.skipped_elements)
+                + u64::from(run.triangles) * u64::from(n * n);
+            require(end <= u64::from(world.elements), "elements")?;
+            next += run.skipped_elements;
+            for _ in 0..run.triangles {
+                let triangle = &triangles[divisions.len()];
+                divisions.push(n);
+                first.push(area_m2.len() as u32);
+                let area = geometry::area(triangle) / f64::from(n * n);
+                for e in next..next + n * n {
+                    area_m2.push(area);
+                    solid.push(run.solid);
+                    seen_as.extend([2 * e, 2 * e + 1]);
+                    for _ in 0..2 {
+                        row.push(if run.owned { rows } else { NO_ROW });
+                        rows += u32::from(run.owned);
+                    }
                 }
+                next += n * n;
             }
         }
         first.push(area_m2.len() as u32);
@@ -161,7 +160,7 @@ impl Block {
             radius_m: world.sphere_radius_m,
             soup: Soup::new(triangles),
             first,
-            divisions: block.divisions.clone(),
+            divisions,
             local_faces,
             seen_as,
             solid,
@@ -198,15 +197,25 @@ impl Block {
         local < self.local_faces && local % 2 == 1 && self.is_solid(local)
     }
 
-    /// The row of a local end, and what another is seen as there; `None` where no row is wanted.
+    /// The row of a local end, where one is wanted.
     #[inline]
-    pub(crate) fn entry(&self, from: u32, seen: u32) -> Option<(u32, u32)> {
-        let (row, seen) = if self.whole {
-            (from, seen)
+    pub(crate) fn row_of(&self, local: u32) -> Option<u32> {
+        let row = if self.whole {
+            local
         } else {
-            (self.row[from as usize], self.seen_as[seen as usize])
+            self.row[local as usize]
         };
-        ((row as usize) < self.rows).then_some((row, seen))
+        ((row as usize) < self.rows).then_some(row)
+    }
+
+    /// What a local end is seen as.
+    #[inline]
+    pub(crate) fn number_of(&self, local: u32) -> u32 {
+        if self.whole {
+            local
+        } else {
+            self.seen_as[local as usize]
+        }
     }
 
     /// Whether rows of a local end are wanted.
@@ -254,7 +263,7 @@ fn require(holds: bool, what: &'static str) -> Result<(), BlockFault> {
     }
 }
 
-fn same_length(what: &'static str, found: usize, expected: usize) -> Result<(), BlockFault> {
+fn same_length(what: &'static str, found: u64, expected: u64) -> Result<(), BlockFault> {
     if found == expected {
         Ok(())
     } else {
@@ -265,3 +274,37 @@ fn same_length(what: &'static str, found: usize, expected: usize) -> Result<(), 
         })
     }
 }
+
+/// Triangles from vertices that are named when they come first, and by how far back they are afterwards.
+fn triangles(coordinates_m: &[f64], corners: &[u32]) -> Result<Vec<[DVec3; 3]>, BlockFault> {
+    let vertices: Vec<DVec3> = coordinates_m
+        .chunks_exact(3)
+        .map(|c| DVec3::new(c[0], c[1], c[2]))
+        .collect();
+    require(vertices.iter().all(|v| v.is_finite()), "vertices_m")?;
+    let mut used = 0;
+    let mut vertex = |back: u32| {
+        used += usize::from(back == 0);
+        let number = if back == 0 {
+            used.checked_sub(1)
+        } else {
+            used.checked_sub(back as usize)
+        };
+        number.and_then(|n| vertices.get(n)).copied()
+    };
+    let mut triangles = Vec::with_capacity(corners.len() / 3);
+    for of in corners.chunks_exact(3) {
+        let [Some(a), Some(b), Some(c)] = [vertex(of[0]), vertex(of[1]), vertex(of[2])] else {
+            return Err(BlockFault::Range { what: "corners" });
+        };
+        triangles.push([a, b, c]);
+    }
+    let whole = |what, length: usize| same_length(what, length as u64, (length / 3 * 3) as u64);
+    whole("corners", corners.len())?;
+    whole("coordinates", coordinates_m.len())?;
+    same_length("vertices", vertices.len() as u64, used as u64)?;
+    Ok(triangles)
+}
+
+#[cfg(test)]
+mod tests;

@@ -4,26 +4,24 @@ use std::sync::OnceLock;
 
 use nestrad_proto::v1;
 
-use crate::{Block, Tracer, trace};
+use crate::{Block, PackedRows, Tracer, trace_packed};
 
 /// Names the results of this kernel on this machine: the same name, the same bits. It holds a digest of
-/// the rows of a small job, so that a change of the kernel, or a machine whose sine differs in the last
+/// the packed rows of a small job, so that a change of the kernel or of the format, or a machine whose sine differs in the last
 /// bit, has another name.
 pub fn kernel() -> &'static str {
     static NAME: OnceLock<String> = OnceLock::new();
     NAME.get_or_init(|| {
         let rows = sample().unwrap_or_default();
         let mut hasher = blake3::Hasher::new();
-        for number in rows.lengths.iter().chain(&rows.ends) {
-            hasher.update(&number.to_le_bytes());
-        }
+        hasher.update(&rows.packed);
         let digest = hasher.finalize().to_hex();
         format!("nestrad {} {}", env!("CARGO_PKG_VERSION"), &digest[..16])
     })
 }
 
 /// Leaves and stems at odd places, over soil, with a far field; lines and rays.
-fn sample() -> Option<v1::Rows> {
+fn sample() -> Option<PackedRows> {
     let mut state = 1u64;
     let mut random = || {
         // Knuth's MMIX generator: any will do
@@ -41,6 +39,13 @@ fn sample() -> Option<v1::Rows> {
             vertices_m.extend(middle.map(|m| m + 0.3 * (random() - 0.5)));
         }
     }
+    let run = |solid| v1::TriangleRun {
+        triangles: 1,
+        divisions: 2,
+        owned: true,
+        solid,
+        ..v1::TriangleRun::default()
+    };
     let block = v1::Block {
         world: Some(v1::World {
             min_m: vector(0.0, 0.0, -0.1),
@@ -60,10 +65,8 @@ fn sample() -> Option<v1::Rows> {
             far_bins: 3,
         }),
         vertices_m,
-        first_element: (0..TRIANGLES as u32).map(|t| 4 * t).collect(),
-        divisions: vec![2; TRIANGLES],
-        solid: (0..TRIANGLES).map(|t| t % 3 == 0).collect(),
-        owned: vec![true; TRIANGLES],
+        corners: vec![0; 3 * TRIANGLES],
+        runs: (0..TRIANGLES).map(|t| run(t % 3 == 0)).collect(),
         owned_soil_cells: (0..4).collect(),
     };
     let lines = (0..8).map(|k| {
@@ -90,7 +93,8 @@ fn sample() -> Option<v1::Rows> {
         }),
     };
     let block = Block::new(&block).ok()?;
-    Some(trace(&block, &Tracer::new(&block), &batch))
+    let tracer = Tracer::new(&block);
+    Some(trace_packed(&block, || &tracer, &batch))
 }
 
 #[cfg(test)]
@@ -100,7 +104,7 @@ mod tests {
     #[test]
     fn the_sample_exercises_lines_and_rays() {
         let rows = sample().unwrap();
-        assert_eq!(rows.lengths.len(), 8 * 60 + 4);
+        assert_eq!(rows.rows, 8 * 60 + 4);
         assert!(rows.segments > 1000 && rows.rays > 1000, "{rows:?}");
         assert_eq!(kernel().len(), "nestrad 0.1.0 ".len() + 16);
     }

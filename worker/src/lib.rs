@@ -21,11 +21,6 @@ pub use rays::Tracer;
 
 use nestrad_proto::v1;
 
-/// Computes the lines of a batch of a block, without its rays.
-pub fn trace_lines(block: &Block, batch: &v1::Batch) -> v1::Rows {
-    rows::collect(block, &lines::trace(block, batch))
-}
-
 /// Computes one batch of a block.
 ///
 /// `tracer` holds the acceleration structure of the block's geometry; build it once per block.
@@ -33,6 +28,44 @@ pub fn trace(block: &Block, tracer: &Tracer, batch: &v1::Batch) -> v1::Rows {
     let mut traced = lines::trace(block, batch);
     rays::complete(block, tracer, batch, &mut traced);
     rows::collect(block, &traced)
+}
+
+/// The rows of a job, as they travel and are kept.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct PackedRows {
+    /// See `RowsHeader` in the protocol.
+    pub packed: Vec<u8>,
+    /// Rows of the block, empty ones included.
+    pub rows: u32,
+    /// Entries of all rows.
+    pub entries: u64,
+    /// Lines that were traced.
+    pub lines: u64,
+    /// Segments between hits that they gave.
+    pub segments: u64,
+    /// Rays that were cast.
+    pub rays: u64,
+}
+
+/// Computes a job of a block; `tracer` is asked for where the job casts rays.
+pub fn trace_packed<'a>(
+    block: &Block,
+    tracer: impl FnOnce() -> &'a Tracer,
+    batch: &v1::Batch,
+) -> PackedRows {
+    let mut traced = lines::trace(block, batch);
+    if batch.rays.is_some() {
+        rays::complete(block, tracer(), batch, &mut traced);
+    }
+    let (packed, entries) = rows::pack(block, &traced);
+    PackedRows {
+        packed,
+        rows: block.rows as u32,
+        entries,
+        lines: traced.lines,
+        segments: traced.segments(),
+        rays: traced.rays,
+    }
 }
 
 /// What the far field is the mean of, along the lines of a batch: a row for each far end, in their order,

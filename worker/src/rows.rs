@@ -1,7 +1,11 @@
 //! From pairs that see each other to rows.
+//!
+//! What a row sees stands by rising number: the order in which lines were traced, or jobs came in, leaves
+//! no mark.
 
 use std::ops::Range;
 
+use nestrad_proto::packed::Packer;
 use nestrad_proto::v1;
 use rayon::prelude::*;
 
@@ -13,7 +17,7 @@ pub(crate) type Pair = (u32, u32);
 /// What one batch found, before it is sorted into rows.
 #[derive(Default)]
 pub(crate) struct Traced {
-    /// Each pair serves both its ends; in the order of directions, then of lines, then along a line.
+    /// Each pair serves both its ends.
     pub(crate) pairs: Vec<Vec<Pair>>,
     /// What rays saw: (who looks, what it sees), the second one does not see back.
     pub(crate) looks: Vec<Pair>,
@@ -21,16 +25,23 @@ pub(crate) struct Traced {
     pub(crate) rays: u64,
 }
 
+impl Traced {
+    /// Segments between hits.
+    pub(crate) fn segments(&self) -> u64 {
+        self.pairs.iter().map(|p| p.len() as u64).sum()
+    }
+}
+
 /// Rows that are sorted together: their counters fit a first-level cache.
 const SORTED_TOGETHER: usize = 1 << 13;
 
-/// Sorts pairs into rows, stably, at a cost that is linear: first into runs of rows, then by counting
-/// within each run, so that neither reaches over more memory than a cache holds.
+/// Sorts pairs into rows: first into runs of rows, then by counting within each run, so that neither reaches
+/// over more memory than a cache holds; then each row.
 pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
     let mut runs: Vec<Vec<Pair>> = vec![Vec::new(); block.rows.div_ceil(SORTED_TOGETHER)];
     let mut put = |from: u32, seen: u32| {
-        if let Some(entry) = block.entry(from, seen) {
-            runs[entry.0 as usize / SORTED_TOGETHER].push(entry);
+        if let Some(row) = block.row_of(from) {
+            runs[row as usize / SORTED_TOGETHER].push((row, block.number_of(seen)));
         }
     };
     for &(a, b) in traced.pairs.iter().flatten() {
@@ -52,7 +63,7 @@ pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
         lengths: lengths.concat(),
         ends: ends.concat(),
         lines: traced.lines,
-        segments: traced.pairs.iter().map(|p| p.len() as u64).sum(),
+        segments: traced.segments(),
         rays: traced.rays,
     }
 }
@@ -77,7 +88,60 @@ fn sorted_by_row(entries: &[Pair], rows: Range<usize>) -> (Vec<u32>, Vec<u32>) {
         ends[*place as usize] = seen;
         *place += 1;
     }
+    let mut rest = &mut ends[..];
+    for &length in &lengths {
+        let (row, left) = rest.split_at_mut(length as usize);
+        row.sort_unstable();
+        rest = left;
+    }
     (lengths, ends)
+}
+
+/// Packs pairs as rows; gives the number of entries, too.
+pub(crate) fn pack(block: &Block, traced: &Traced) -> (Vec<u8>, u64) {
+    let (mut mutual, mut single) = (Runs::new(block.rows), Runs::new(block.rows));
+    for &(a, b) in traced.pairs.iter().flatten() {
+        match (block.row_of(a), block.row_of(b)) {
+            (Some(a), Some(b)) => mutual.push((a.max(b), a.min(b))),
+            (Some(row), None) => single.push((row, block.number_of(b))),
+            (None, Some(row)) => single.push((row, block.number_of(a))),
+            (None, None) => {}
+        }
+    }
+    for &(a, b) in &traced.looks {
+        if let Some(row) = block.row_of(a) {
+            single.push((row, block.number_of(b)));
+        }
+    }
+    let mut packer = Packer::new(block.ends());
+    mutual.for_each(|(row, other)| packer.mutual(row, other));
+    single.for_each(|(row, end)| packer.single(row, end));
+    let entries = packer.entries();
+    (packer.finish(), entries)
+}
+
+/// Pairs of a row and what it sees, in runs of rows that are sorted together.
+struct Runs(Vec<Vec<u64>>);
+
+impl Runs {
+    fn new(rows: usize) -> Self {
+        Self(vec![Vec::new(); rows.div_ceil(SORTED_TOGETHER)])
+    }
+
+    fn push(&mut self, (row, seen): Pair) {
+        let key = u64::from(row) << 32 | u64::from(!seen);
+        self.0[row as usize / SORTED_TOGETHER].push(key);
+    }
+
+    /// By rising row, within a row by falling number of what it sees.
+    fn for_each(self, mut pair: impl FnMut(Pair)) {
+        for mut run in self.0 {
+            run.sort_unstable();
+            for key in run {
+                pair(((key >> 32) as u32, !(key as u32)));
+            }
+        }
+    }
 }
 
 /// Sorts looks into rows of the far ends and of the two ways out.

@@ -28,10 +28,21 @@ fn block() -> v1::Block {
             far_bins: 3,
         }),
         vertices_m: (0..18).map(|k| f64::from(k * 7 % 18) / 18.0).collect(),
-        first_element: vec![0, 4],
-        divisions: vec![2, 1],
-        solid: vec![false, true],
-        owned: vec![true, false],
+        corners: vec![0; 6],
+        runs: vec![
+            v1::TriangleRun {
+                triangles: 1,
+                divisions: 2,
+                owned: true,
+                ..v1::TriangleRun::default()
+            },
+            v1::TriangleRun {
+                triangles: 1,
+                divisions: 1,
+                solid: true,
+                ..v1::TriangleRun::default()
+            },
+        ],
         owned_soil_cells: vec![0, 3],
     }
 }

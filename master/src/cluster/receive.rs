@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
-use nestrad_proto::packed;
+use nestrad_proto::packed::{self, Shape};
 use nestrad_proto::v1::{ReturnRowsRequest, RowsHeader, return_rows_request};
 use tonic::{Code, Status, Streaming};
 
@@ -12,8 +12,7 @@ use crate::exchange::{JobRows, Traced};
 /// What a result has to fit.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Expected {
-    pub(super) rows: u32,
-    pub(super) ends: u32,
+    pub(super) shape: Shape,
     pub(super) most_bytes: u64,
 }
 
@@ -44,23 +43,20 @@ pub(super) fn check_header(header: &RowsHeader, expected: &Expected) -> Result<(
             "result with {found} {what}, expected {limit}"
         )))
     };
-    let (rows, entries) = (u64::from(header.rows), header.entries);
-    if header.rows != expected.rows {
-        return fault("rows", rows, u64::from(expected.rows));
+    if header.rows != expected.shape.rows {
+        let rows = u64::from(expected.shape.rows);
+        return fault("rows", u64::from(header.rows), rows);
     }
-    let end_bytes = packed::end_bytes(expected.ends as usize);
-    if header.end_bytes as usize != end_bytes {
-        let found = u64::from(header.end_bytes);
-        return fault("bytes an entry", found, end_bytes as u64);
+    let (entries, bytes) = (header.entries, header.packed_bytes);
+    if bytes > expected.most_bytes {
+        return fault("bytes", bytes, expected.most_bytes);
     }
-    if header.packed_bytes > expected.most_bytes {
-        return fault("bytes", header.packed_bytes, expected.most_bytes);
-    }
-    if entries > header.packed_bytes / end_bytes as u64
-        || header.packed_bytes > packed::most_bytes(rows, entries, end_bytes)
-    {
-        let fits = header.packed_bytes / end_bytes as u64;
-        return fault("entries for its bytes", entries, fits);
+    if entries > packed::most_entries(bytes) || bytes > packed::most_bytes(entries) {
+        return fault(
+            "entries for its bytes",
+            entries,
+            packed::most_entries(bytes),
+        );
     }
     if header.checksum.len() != 32 {
         return fault("bytes of checksum", header.checksum.len() as u64, 32);
@@ -107,8 +103,7 @@ pub(super) fn check_body(
     if blake3::hash(&body).as_bytes()[..] != header.checksum[..] {
         return Err(Status::data_loss("result does not match its checksum"));
     }
-    let rows = u64::from(expected.rows);
-    packed::check(&body, rows, header.entries, expected.ends)
+    packed::check(&body, expected.shape, header.entries)
         .map_err(|fault| Status::invalid_argument(fault.to_string()))?;
     Ok(JobRows {
         packed: Bytes::from(body),

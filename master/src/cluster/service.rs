@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
+use nestrad_proto::packed::Shape;
 use nestrad_proto::v1::worker_service_server::{WorkerService, WorkerServiceServer};
 use nestrad_proto::v1::{
     Drain, FetchBlockRequest, FetchBlockResponse, GiveBackRequest, GiveBackResponse, JoinRequest,
@@ -295,8 +296,10 @@ impl Cluster {
         Ok(wanted.and_then(|leased| {
             let open = state.solves.get(&leased.solve)?;
             Some(Expected {
-                rows: open.blocks[leased.block].rows,
-                ends: open.ends,
+                shape: Shape {
+                    rows: open.blocks[leased.block].rows,
+                    ends: open.ends,
+                },
                 most_bytes: u64::from(self.0.limits.result_bytes),
             })
         }))

@@ -6,6 +6,7 @@ use std::time::Duration;
 
 use bytes::Bytes;
 use nestrad_common::scene::Scene;
+use nestrad_proto::packed::Shape;
 use nestrad_proto::v1;
 use nestrad_worker::Demand;
 use prost::Message;
@@ -102,8 +103,11 @@ impl Cluster {
         let mut known = Vec::new();
         if let Some(kept) = kept {
             for (number, (job, key)) in jobs.iter().zip(&keys).enumerate() {
-                let rows = u64::from(sent[job.block].rows);
-                if let Some(rows) = kept.get(key, rows, world.ends.len() as u32) {
+                let shape = Shape {
+                    rows: sent[job.block].rows,
+                    ends: world.ends.len() as u32,
+                };
+                if let Some(rows) = kept.get(key, shape) {
                     self.0.compute.install(|| assembly.put(number, rows))?;
                     progress.inc(1);
                     known.push(number);

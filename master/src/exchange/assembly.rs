@@ -3,12 +3,11 @@
 use std::sync::Arc;
 
 use bytes::Bytes;
-use nestrad_proto::packed::{self, PackedFault};
-use nestrad_proto::v1;
-use rayon::prelude::*;
+use nestrad_worker::PackedRows;
 
 use super::jobs::BlockOf;
-use super::rows::{BatchRows, put_together};
+use super::join::join;
+use super::rows::BatchRows;
 use super::split::JobOf;
 use super::{Exchange, ExchangeError, JobCounts, Traced};
 use crate::world::World;
@@ -22,16 +21,15 @@ pub struct JobRows {
     pub traced: Traced,
 }
 
-impl JobRows {
-    /// Packs what the kernel gave.
-    pub fn pack(rows: &v1::Rows, ends: usize) -> Self {
+impl From<PackedRows> for JobRows {
+    fn from(rows: PackedRows) -> Self {
         Self {
-            packed: packed::pack(rows, packed::end_bytes(ends)).into(),
+            packed: rows.packed.into(),
             traced: Traced {
                 lines: rows.lines,
                 segments: rows.segments,
                 rays: rows.rays,
-                row_entries: rows.ends.len() as u64,
+                row_entries: rows.entries,
             },
         }
     }
@@ -51,8 +49,7 @@ pub struct Assembly<'a> {
 }
 
 impl<'a> Assembly<'a> {
-    /// An assembly without results. Jobs stand by batch, then by block, in the order in which their rows
-    /// are joined.
+    /// An assembly without results. Jobs stand by batch.
     pub fn new(world: &'a World, blocks: &'a [BlockOf], jobs: Arc<[JobOf]>, batches: u32) -> Self {
         let mut missing = vec![0; batches as usize];
         for job in jobs.iter() {
@@ -84,30 +81,19 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// Joins the jobs of each block, then the blocks; their results are freed.
+    /// Joins the jobs of a batch; their results are freed.
     fn complete(&mut self, batch: u32) -> Result<BatchRows, ExchangeError> {
-        let end_bytes = packed::end_bytes(self.world.ends.len());
-        let mut job = self.jobs.partition_point(|j| j.batch < batch);
-        let mut parts = Vec::with_capacity(self.blocks.len());
-        for (number, block) in self.blocks.iter().enumerate() {
-            let mut results = Vec::new();
-            while let Some(next) = self.jobs.get(job)
-                && (next.batch, next.block) == (batch, number)
-            {
-                results.extend(self.results[job].take());
-                job += 1;
-            }
-            parts.push((block, results));
-        }
-        let joined: Result<Vec<(&BlockOf, v1::Rows)>, PackedFault> = parts
-            .into_par_iter()
-            .map(|(block, results)| {
-                let packed: Vec<&[u8]> = results.iter().map(|r| &r.packed[..]).collect();
-                let rows = packed::join(&packed, block.rows(self.world).len(), end_bytes)?;
-                Ok((block, rows))
-            })
+        let first = self.jobs.partition_point(|j| j.batch < batch);
+        let jobs = self.jobs[first..].iter().zip(&mut self.results[first..]);
+        let mut parts: Vec<(&BlockOf, Vec<JobRows>)> = self
+            .blocks
+            .iter()
+            .map(|block| (block, Vec::new()))
             .collect();
-        put_together(self.world, batch, joined?)
+        for (job, result) in jobs.take_while(|(job, _)| job.batch == batch) {
+            parts[job.block].1.extend(result.take());
+        }
+        Ok(join(self.world, &parts)?)
     }
 
     /// The exchange, once all jobs are in; `None` before.

@@ -2,7 +2,6 @@
 
 use glam::DVec3;
 use nestrad_common::directions::{Axes, Purpose, axes, stream};
-use nestrad_common::scene::Scene;
 use nestrad_proto::v1;
 use rand::RngExt;
 
@@ -74,26 +73,6 @@ pub fn batch_of_lines(
         lines,
         ..v1::Batch::default()
     }
-}
-
-/// The geometry of a block, as jobs carry it.
-pub fn block_message(scene: &Scene, world: &World, block: &BlockOf) -> v1::Block {
-    let mut message = v1::Block {
-        world: Some(world_message(world)),
-        ..v1::Block::default()
-    };
-    for &(t, owned) in &block.triangles {
-        let t = t as usize;
-        message
-            .vertices_m
-            .extend(scene.triangles[t].iter().flat_map(|p| p.to_array()));
-        message.first_element.push(world.elements.first[t]);
-        message.divisions.push(world.elements.divisions[t]);
-        message.owned.push(owned);
-        message.solid.push(world.solid[t]);
-    }
-    message.owned_soil_cells.clone_from(&block.soil_cells);
-    message
 }
 
 /// Which triangles and soil cells a block holds.

@@ -3,12 +3,14 @@
 use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nestrad_common::scene::Scene;
-use nestrad_worker::{Block, Tracer};
+use nestrad_proto::packed::Shape;
+use nestrad_worker::{Block, Tracer, trace_packed};
 use prost::Message;
 use rayon::prelude::*;
 
 use super::assembly::{Assembly, JobRows};
-use super::jobs::{BlockOf, block_message};
+use super::geometry::block_message;
+use super::jobs::BlockOf;
 use super::split::{JobOf, batches, split};
 use super::{Exchange, ExchangeError, JobCounts, Sampling};
 use crate::output::progress::Progress;
@@ -31,10 +33,14 @@ pub fn trace_kept(
     progress.stage("exchange", jobs.len() as u64);
 
     let mut assembly = Assembly::new(world, &blocks, jobs.clone(), sampling.batches);
+    let shape = Shape {
+        rows: world.rows() as u32,
+        ends: world.ends.len() as u32,
+    };
     let mut missing: Vec<(usize, Key)> = Vec::new();
     for (number, job) in jobs.iter().enumerate() {
         let key = store::key(&id, &job.message(&batches[job.batch as usize]));
-        match kept.get(&key, world.rows() as u64, world.ends.len() as u32) {
+        match kept.get(&key, shape) {
             Some(rows) => {
                 assembly.put(number, rows)?;
                 progress.inc(1);
@@ -55,13 +61,8 @@ pub fn trace_kept(
             progress.check()?;
             let job = &jobs[number];
             let batch = job.message(&batches[job.batch as usize]);
-            let rows = if batch.rays.is_some() {
-                let tracer = tracer.get_or_init(|| Tracer::new(&block));
-                nestrad_worker::trace(&block, tracer, &batch)
-            } else {
-                nestrad_worker::trace_lines(&block, &batch)
-            };
-            let rows = JobRows::pack(&rows, world.ends.len());
+            let tracer = || tracer.get_or_init(|| Tracer::new(&block));
+            let rows: JobRows = trace_packed(&block, tracer, &batch).into();
             kept.put(key, &rows);
             let mut assembly = assembly.lock().unwrap_or_else(PoisonError::into_inner);
             assembly.put(number, rows)?;

@@ -2,7 +2,9 @@
 //! and their rows are put together.
 
 mod assembly;
+mod geometry;
 mod jobs;
+mod join;
 mod kept;
 mod outlook;
 mod partition;
@@ -22,7 +24,8 @@ use thiserror::Error;
 use crate::output::progress::Cancelled;
 use crate::world::World;
 pub use assembly::{Assembly, JobRows};
-pub use jobs::{BlockOf, batch_message, batch_of_lines, block_message, world_message};
+pub use geometry::block_message;
+pub use jobs::{BlockOf, batch_message, batch_of_lines, world_message};
 pub use kept::trace_kept;
 pub use outlook::Outlook;
 pub use partition::{SmallestWorker, partition};

@@ -13,18 +13,21 @@ use super::jobs::{BlockOf, batch_message};
 use crate::world::World;
 
 /// A job is cut so that one thread computes it in about this time, seconds: long against what it costs
-/// to hand it out, short against a solve.
-const JOB_S: f64 = 0.2;
+/// to hand it out, short against a solve; where a solve is short, shorter by up to so much, so that there
+/// are about so many jobs.
+const MOST_JOB_S: f64 = 0.3;
+const LEAST_JOB_S: f64 = 0.02;
+const JOBS: f64 = 64.0;
 
 /// Most parts that the lattice of one direction, or the faces of a block, are cut into.
 const MOST_PARTS: f64 = 64.0;
 
 /// Seconds per triangle and direction, per segment, per lattice point, per row and job, per ray; measured
-/// on maize, one thread.
-const TRIANGLE_S: f64 = 25e-9;
-const SEGMENT_S: f64 = 60e-9;
-const LINE_S: f64 = 6e-9;
-const ROW_S: f64 = 4e-9;
+/// on maize, one thread, packing included.
+const TRIANGLE_S: f64 = 40e-9;
+const SEGMENT_S: f64 = 90e-9;
+const LINE_S: f64 = 9e-9;
+const ROW_S: f64 = 1e-9;
 const RAY_S: f64 = 1e-6;
 
 /// Seconds per triangle to build the tree that rays are cast in. Who casts the first rays over a block
@@ -70,8 +73,7 @@ impl JobOf {
     }
 }
 
-/// The jobs of all blocks and batches: by batch, then by block, then in the order in which their rows are
-/// joined.
+/// The jobs of all blocks and batches: by batch, then by block.
 pub fn split(
     world: &World,
     blocks: &[BlockOf],
@@ -82,10 +84,15 @@ pub fn split(
         .iter()
         .map(|block| Sizes::of(world, block, sampling))
         .collect();
+    let all_s: f64 = batches
+        .iter()
+        .flat_map(|batch| sizes.iter().map(|sizes| sizes.batch_s(batch, world)))
+        .sum();
+    let job_s = (all_s / JOBS).clamp(LEAST_JOB_S, MOST_JOB_S);
     let mut jobs = Vec::new();
     for batch in batches {
         for (block, sizes) in sizes.iter().enumerate() {
-            sizes.split(block, batch, world, &mut jobs);
+            sizes.split((block, batch), world, job_s, &mut jobs);
         }
     }
     jobs
@@ -104,9 +111,9 @@ pub fn demand(world: &World, block: &BlockOf, sampling: &Sampling) -> Demand {
     let direction_s = sizes.direction_s(world, sampling.line_area_m2, 1.0);
     // a job of one direction in its parts, or of as many directions as fill its time
     let most = f64::from(sampling.sets_per_batch * sampling.axes.count()).max(1.0);
-    let directions = (JOB_S / direction_s).clamp(1.0 / MOST_PARTS, most);
+    let directions = (MOST_JOB_S / direction_s).clamp(1.0 / MOST_PARTS, most);
     let entries = 2.0 * sizes.segments(world, sampling.line_area_m2, 1.0) * directions;
-    let entries = entries.max(JOB_S / RAY_S) as u64;
+    let entries = entries.max(MOST_JOB_S / RAY_S) as u64;
     Demand {
         entries,
         ..sizes.demand
@@ -164,8 +171,25 @@ impl Sizes {
             + LINE_S * cos * world.ground_area_m2() / line_area_m2
     }
 
+    fn lines_s(&self, lines: &v1::Lines, world: &World) -> f64 {
+        let cos = lines.direction.as_ref().map_or(1.0, |d| d.z);
+        self.direction_s(world, lines.line_area_m2, cos)
+    }
+
+    /// What a batch of the block takes in all.
+    fn batch_s(&self, batch: &v1::Batch, world: &World) -> f64 {
+        let lines_s: f64 = batch.lines.iter().map(|l| self.lines_s(l, world)).sum();
+        lines_s + batch.rays.map_or(0.0, |_| RAY_S * self.rays)
+    }
+
     /// Cuts a batch of a block into jobs.
-    fn split(&self, block: usize, batch: &v1::Batch, world: &World, jobs: &mut Vec<JobOf>) {
+    fn split(
+        &self,
+        (block, batch): (usize, &v1::Batch),
+        world: &World,
+        job_s: f64,
+        jobs: &mut Vec<JobOf>,
+    ) {
         let rows_s = ROW_S * self.demand.rows as f64;
         let job = |lines: Range<usize>, part, rays, cost_s: f64| JobOf {
             block,
@@ -177,10 +201,9 @@ impl Sizes {
         };
         let (mut first, mut cost_s) = (0, 0.0);
         for (k, lines) in batch.lines.iter().enumerate() {
-            let cos = lines.direction.as_ref().map_or(1.0, |d| d.z);
-            let this_s = self.direction_s(world, lines.line_area_m2, cos);
-            let parts = (this_s / JOB_S).round().clamp(1.0, MOST_PARTS) as u32;
-            if cost_s > 0.0 && (cost_s + this_s > JOB_S || parts > 1) {
+            let this_s = self.lines_s(lines, world);
+            let parts = (this_s / job_s).round().clamp(1.0, MOST_PARTS) as u32;
+            if cost_s > 0.0 && (cost_s + this_s > job_s || parts > 1) {
                 jobs.push(job(first..k, (0, 1), None, cost_s));
                 (first, cost_s) = (k, 0.0);
             }
@@ -195,7 +218,7 @@ impl Sizes {
         // the rays of a batch come after its lines
         let rays_s = RAY_S * self.rays;
         let rest = first..batch.lines.len();
-        if batch.rays.is_none() || cost_s + rays_s <= JOB_S {
+        if batch.rays.is_none() || cost_s + rays_s <= job_s {
             let rays = batch.rays.map(|_| (0, 1));
             if rays.is_some() || !rest.is_empty() {
                 jobs.push(job(rest, (0, 1), rays, cost_s + rays_s));
@@ -205,7 +228,7 @@ impl Sizes {
         if !rest.is_empty() {
             jobs.push(job(rest, (0, 1), None, cost_s));
         }
-        let parts = (rays_s / JOB_S).ceil().clamp(1.0, MOST_PARTS) as u32;
+        let parts = (rays_s / job_s).ceil().clamp(1.0, MOST_PARTS) as u32;
         let end = batch.lines.len();
         let part_s = rays_s / f64::from(parts) + TREE_S * self.demand.triangles as f64;
         let part = |p| job(end..end, (0, 1), Some((p, parts)), part_s);

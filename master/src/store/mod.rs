@@ -15,6 +15,7 @@ use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
+use nestrad_proto::packed::{self, Shape};
 use nestrad_proto::v1;
 use prost::Message;
 use thiserror::Error;
@@ -141,14 +142,14 @@ impl Store {
         })))
     }
 
-    /// The result of that name, if it is kept and whole. `rows` and `ends` are those of its job.
-    pub fn get(&self, key: &Key, rows: u64, ends: u32) -> Option<JobRows> {
+    /// The result of that name, if it is kept and whole. The shape is that of its job.
+    pub fn get(&self, key: &Key, shape: Shape) -> Option<JobRows> {
         let mut file = lock(&self.0.file);
         let read = file.as_mut()?.get(key);
         match read {
             Ok(found) => found.filter(|found| {
                 let entries = found.traced.row_entries;
-                nestrad_proto::packed::check(&found.packed, rows, entries, ends).is_ok()
+                packed::check(&found.packed, shape, entries).is_ok()
             }),
             Err(reason) => {
                 tell(

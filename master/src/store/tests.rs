@@ -6,27 +6,27 @@ use bytes::Bytes;
 use super::*;
 use crate::exchange::Traced;
 
-const ENDS: u32 = 250;
+const SHAPE: Shape = Shape {
+    rows: 10_000,
+    ends: 250,
+};
 
-/// A row of `entries` entries, packed.
-fn rows(entries: usize, end: u8) -> JobRows {
-    let rows = v1::Rows {
-        lengths: vec![entries as u32],
-        ends: vec![u32::from(end); entries],
-        ..v1::Rows::default()
-    };
+/// Rows that see one end each, packed.
+fn rows(count: u32, end: u8) -> JobRows {
+    let mut packer = packed::Packer::new(SHAPE.ends as usize);
+    (0..count).for_each(|row| packer.single(row, u32::from(end)));
     JobRows {
-        packed: Bytes::from(nestrad_proto::packed::pack(&rows, 1)),
         traced: Traced {
             lines: 7,
-            row_entries: entries as u64,
+            row_entries: packer.entries(),
             ..Traced::default()
         },
+        packed: Bytes::from(packer.finish()),
     }
 }
 
 fn get(store: &Store, name: u8) -> Option<JobRows> {
-    store.get(&[name; 32], 1, ENDS)
+    store.get(&[name; 32], SHAPE)
 }
 
 #[test]
@@ -40,7 +40,7 @@ fn what_was_put_is_there_after_reopening() {
     assert_eq!(get(&store, 2), None);
     assert_eq!(store.warning(), None);
     // a job with other rows or ends does not take it
-    assert_eq!(store.get(&[1; 32], 1, 9), None);
+    assert_eq!(store.get(&[1; 32], Shape { rows: 9, ..SHAPE }), None);
 }
 
 #[test]
@@ -55,7 +55,7 @@ fn the_oldest_go_first_when_it_is_full() {
     let kept: Vec<u8> = (0..20)
         .filter(|&name| get(&store, name).is_some())
         .collect();
-    assert_eq!(kept, [16, 17, 18, 19]);
+    assert_eq!(kept, [18, 19]);
 }
 
 #[test]
@@ -93,18 +93,20 @@ fn a_file_that_is_no_store_is_put_aside() {
 fn a_broken_result_is_not_taken() {
     let folder = tempfile::tempdir().unwrap();
     let store = Store::open(folder.path(), 1 << 20).unwrap();
-    store.put([1; 32], &rows(5_000, 77));
+    store.put([1; 32], &rows(5_000, 249));
     drop(store);
     let path = folder.path().join("results.redb");
     let bytes = fs::read(&path).unwrap();
-    let at = bytes.windows(64).position(|w| w == [77; 64]).unwrap();
+    // a row further on, its end no less than the largest: all bytes are alike
+    let packed = &rows(5_000, 249).packed[100..164];
+    let at = bytes.windows(64).position(|w| w == packed).unwrap();
     let file = fs::File::options().write(true).open(&path).unwrap();
-    file.write_all_at(&[78], at as u64 + 10).unwrap();
+    file.write_all_at(&[!packed[10]], at as u64 + 10).unwrap();
     drop(file);
     let store = Store::open(folder.path(), 1 << 20).unwrap();
     assert_eq!(get(&store, 1), None);
     // it is computed anew, and kept
-    store.put([1; 32], &rows(5_000, 77));
+    store.put([1; 32], &rows(5_000, 249));
     store.close();
-    assert_eq!(get(&store, 1), Some(rows(5_000, 77)));
+    assert_eq!(get(&store, 1), Some(rows(5_000, 249)));
 }

@@ -14,16 +14,17 @@ const SPOILT: [(&str, Spoil); 9] = [
         packed.fill(0xff);
         header.checksum = blake3::hash(packed).as_bytes().to_vec();
     }),
-    ("an end that there is not", |header, packed| {
+    ("a row that there is not", |header, packed| {
+        // a gamma code of many zeros
         let n = packed.len();
-        packed[n - header.end_bytes as usize..].fill(0xff);
+        packed[n - 8..n - 5].fill(0);
         header.checksum = blake3::hash(packed).as_bytes().to_vec();
     }),
     ("too few bytes", |_, packed| packed.truncate(100)),
     ("too many bytes", |_, packed| packed.extend([0; 100])),
     ("too many rows", |header, _| header.rows += 1),
     ("too many entries", |header, _| header.entries += 1),
-    ("another width", |header, _| header.end_bytes = 4),
+    ("another checksum", |header, _| header.checksum[0] ^= 1),
     ("more bytes than fit the machine", |header, _| {
         header.packed_bytes = u64::MAX;
         header.entries = u64::MAX / 8;

@@ -35,10 +35,13 @@ fn block(triangles: &[[DVec3; 3]], [min, max]: [DVec3; 2], periodic: bool) -> Bl
             .flatten()
             .flat_map(|p| p.to_array())
             .collect(),
-        first_element: (0..n as u32).collect(),
-        divisions: vec![1; n],
-        owned: vec![true; n],
-        solid: vec![false; n],
+        corners: vec![0; 3 * n],
+        runs: vec![v1::TriangleRun {
+            triangles: n as u32,
+            divisions: 1,
+            owned: true,
+            ..v1::TriangleRun::default()
+        }],
         ..v1::Block::default()
     };
     Block::new(&message).unwrap()

@@ -5,13 +5,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
-use nestrad_proto::packed;
 use nestrad_proto::v1::{Batch, RowsHeader};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::oneshot;
 
 use super::blocks::Ready;
-use crate::{trace, trace_lines};
+use crate::trace_packed;
 
 /// A pool of one thread for each job at a time: jobs then neither wait for one another, nor take turns on
 /// one thread.
@@ -50,26 +49,19 @@ pub(super) async fn compute(
 
 fn rows(ready: &Ready, batch: &Batch) -> Computed {
     let begun = Instant::now();
-    let rows = if batch.rays.is_some() {
-        trace(&ready.block, ready.tracer(), batch)
-    } else {
-        trace_lines(&ready.block, batch)
-    };
-    let end_bytes = packed::end_bytes(ready.block.ends());
-    let packed = Bytes::from(packed::pack(&rows, end_bytes));
+    let rows = trace_packed(&ready.block, || ready.tracer(), batch);
     Computed {
         header: RowsHeader {
-            packed_bytes: packed.len() as u64,
-            checksum: blake3::hash(&packed).as_bytes().to_vec(),
-            rows: rows.lengths.len() as u32,
-            entries: rows.ends.len() as u64,
-            end_bytes: end_bytes as u32,
+            packed_bytes: rows.packed.len() as u64,
+            checksum: blake3::hash(&rows.packed).as_bytes().to_vec(),
+            rows: rows.rows,
+            entries: rows.entries,
             lines: rows.lines,
             segments: rows.segments,
             rays: rows.rays,
             compute_s: begun.elapsed().as_secs_f64(),
             ..RowsHeader::default()
         },
-        packed,
+        packed: rows.packed.into(),
     }
 }

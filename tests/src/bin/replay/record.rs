@@ -1,12 +1,18 @@
 //! Times and sizes of real jobs.
 
 use std::fmt;
-use std::time::Instant;
+use std::sync::Arc;
 
 use glam::DVec2;
 use nestrad_common::generate::{Maize, Stand};
-use nestrad_master::exchange::{BlockOf, JobOf, JobRows, batches, block_message, demand, split};
+use nestrad_common::problem::Problem;
+use nestrad_master::exchange::{
+    Assembly, BlockOf, JobCounts, JobOf, JobRows, batches, block_message, demand, split,
+};
+use nestrad_master::output::resources::cpu_seconds;
 use nestrad_master::plan::Settings;
+use nestrad_master::world::World;
+use nestrad_proto::packed::{self, Shape};
 use nestrad_tests::canopies::{par_and_nir, problem, uniform_sky};
 use nestrad_tests::solving::plan;
 use nestrad_worker::Demand;
@@ -15,49 +21,68 @@ use prost::Message;
 /// A job as it was measured.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Job {
+    pub(crate) batch: u32,
     /// What the master expects it to take, seconds.
     pub(crate) cost_s: f64,
-    /// What it took on one thread, packing included, seconds.
+    /// What it takes of a processor, packing included, seconds.
     pub(crate) took_s: f64,
     /// Packed rows, bytes.
     pub(crate) bytes: u64,
+    pub(crate) entries: u64,
     /// It casts rays, for which a tree is built.
     pub(crate) rays: bool,
 }
 
-/// A recorded solve.
+/// A recorded solve. All times are processor seconds of one thread.
 #[derive(Clone, Debug)]
 pub(crate) struct Recorded {
     pub(crate) triangles: usize,
-    pub(crate) measured: usize,
-    pub(crate) entries: u64,
+    measured: usize,
     pub(crate) block_bytes: u64,
-    /// Time to make a block ready, without and with its tree, seconds.
-    pub(crate) ready_s: [f64; 2],
+    /// To make a block ready, and its tree.
+    pub(crate) ready_s: f64,
+    pub(crate) tree_s: f64,
     pub(crate) demand: Demand,
     pub(crate) jobs: Vec<Job>,
+    /// What the master takes for an entry to check it, and to join it into rows.
+    pub(crate) check_s: f64,
+    pub(crate) join_s: f64,
+}
+
+/// What is solved.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Field {
+    pub(crate) rows: u32,
+    pub(crate) accuracy_percent: f64,
+}
+
+/// Rows of maize on one half of the ground.
+fn canopy(rows: u32) -> Problem {
+    let mut field = Maize {
+        stand: Stand {
+            rows,
+            plants_per_row: 40,
+            row_spacing_m: 0.8,
+            plant_spacing_m: 0.13,
+        },
+        leaf_triangle_m2: 1.5e-4,
+        seed: 11,
+    }
+    .generate()
+    .unwrap();
+    // the pattern is twice as wide as what grows on it
+    field.pattern.size_m *= DVec2::new(2.0, 1.0);
+    problem(&field, &par_and_nir(), uniform_sky(4, 2))
 }
 
 impl Recorded {
-    /// Computes every so many jobs of a field whose other half is bare.
-    pub(crate) fn measure(rows: u32, every: usize) -> Self {
-        let mut field = Maize {
-            stand: Stand {
-                rows,
-                plants_per_row: 40,
-                row_spacing_m: 0.8,
-                plant_spacing_m: 0.13,
-            },
-            leaf_triangle_m2: 1.5e-4,
-            seed: 11,
-        }
-        .generate()
-        .unwrap();
-        // the pattern is twice as wide as what grows on it
-        field.pattern.size_m *= DVec2::new(2.0, 1.0);
-        let problem = problem(&field, &par_and_nir(), uniform_sky(4, 2));
+    /// Computes every so many jobs, each on one thread.
+    pub(crate) fn measure(field: Field, every: usize) -> Self {
+        let problem = canopy(field.rows);
         let settings = Settings {
-            memory_GiB: 64.0,
+            accuracy_percent: field.accuracy_percent,
+            // jobs are recorded, not solved with
+            memory_GiB: 1e6,
             ..Settings::default()
         };
         let plan = plan(&problem, &settings);
@@ -65,79 +90,93 @@ impl Recorded {
         let blocks = [BlockOf::whole(&world)];
         let batches = batches(&sampling);
         let of = split(&world, &blocks, &batches, &sampling);
-        let message = block_message(&problem.scene, &world, &blocks[0]);
-        let block_bytes = message.encoded_len() as u64;
-        let begun = Instant::now();
+        let encoded = block_message(&problem.scene, &world, &blocks[0]).encode_to_vec();
+        let begun_s = cpu_seconds();
+        let message = nestrad_proto::v1::Block::decode(&encoded[..]).unwrap();
         let block = nestrad_worker::Block::new(&message).unwrap();
-        let without_s = begun.elapsed().as_secs_f64();
-        let tracer = nestrad_worker::Tracer::new(&block);
-        let ready_s = [without_s, begun.elapsed().as_secs_f64()];
+        let ready_s = cpu_seconds() - begun_s;
         let one = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
             .unwrap();
-        let mut entries = 0;
+        let begun_s = cpu_seconds();
+        let tracer = one.install(|| nestrad_worker::Tracer::new(&block));
+        let tree_s = cpu_seconds() - begun_s;
+        let mut results: Vec<(JobOf, JobRows)> = Vec::new();
         let mut measure = |job: &JobOf| {
             let batch = job.message(&batches[job.batch as usize]);
-            let begun = Instant::now();
-            let rows = one.install(|| {
-                let rows = if batch.rays.is_some() {
-                    nestrad_worker::trace(&block, &tracer, &batch)
-                } else {
-                    nestrad_worker::trace_lines(&block, &batch)
-                };
-                JobRows::pack(&rows, world.ends.len())
-            });
-            entries += rows.traced.row_entries;
+            let begun_s = cpu_seconds();
+            let rows = one.install(|| nestrad_worker::trace_packed(&block, || &tracer, &batch));
+            let took_s = cpu_seconds() - begun_s;
+            let rows = JobRows::from(rows);
+            results.push((job.clone(), rows.clone()));
             Job {
+                batch: job.batch,
                 cost_s: job.cost_s,
-                took_s: begun.elapsed().as_secs_f64(),
+                took_s,
                 bytes: rows.packed.len() as u64,
+                entries: rows.traced.row_entries,
                 rays: batch.rays.is_some(),
             }
         };
-        let (mut jobs, mut last): (Vec<Job>, Option<(bool, Job)>) = (Vec::new(), None);
-        let mut measured = 0;
-        for (k, job) in of.iter().enumerate() {
-            let rays = job.rays.is_some();
-            let known = last.filter(|(of_rays, _)| k % every != 0 && *of_rays == rays);
-            let this = known.map_or_else(
-                || {
-                    measured += 1;
-                    measure(job)
-                },
-                |(_, job)| job,
-            );
-            last = Some((rays, this));
+        // the others take the time and size of the last one of their kind
+        let (mut jobs, mut last) = (Vec::new(), [None, None]);
+        let mut seen = [0, 0];
+        for job in &of {
+            let kind = usize::from(job.rays.is_some());
+            let this = last[kind].filter(|_| seen[kind] % every != 0);
+            let this: Job = this.unwrap_or_else(|| measure(job));
+            seen[kind] += 1;
+            last[kind] = Some(this);
             jobs.push(Job {
+                batch: job.batch,
                 cost_s: job.cost_s,
                 ..this
             });
         }
+        let measured = results.len();
+        let [check_s, join_s] = one.install(|| master_s(&world, &blocks, results));
         Self {
             triangles: problem.scene.triangles.len(),
             measured,
-            entries,
-            block_bytes,
+            block_bytes: encoded.len() as u64,
             ready_s,
+            tree_s,
             demand: demand(&world, &blocks[0], &sampling),
             jobs,
+            check_s,
+            join_s,
         }
     }
 
-    /// The same with so many times the directions. Rays do not grow with them: they stand in for lines
-    /// where these are few.
-    #[must_use]
-    pub(crate) fn times(&self, times: u32) -> Self {
-        let copies = |job: &Job| {
-            let copies = if job.rays { 1 } else { times as usize };
-            std::iter::repeat_n(*job, copies)
-        };
-        Self {
-            jobs: self.jobs.iter().flat_map(copies).collect(),
-            ..self.clone()
-        }
+    pub(crate) fn jobs_s(&self) -> f64 {
+        self.jobs.iter().map(|j| j.took_s).sum()
     }
+}
+
+/// What a master takes for an entry to check it, and to join it into the rows of its batch.
+fn master_s(world: &World, blocks: &[BlockOf], results: Vec<(JobOf, JobRows)>) -> [f64; 2] {
+    let shape = Shape {
+        rows: world.rows() as u32,
+        ends: world.ends.len() as u32,
+    };
+    let (mut jobs, mut rows): (Vec<JobOf>, Vec<JobRows>) = results.into_iter().unzip();
+    jobs.iter_mut().for_each(|job| job.batch = 0);
+    let entries: u64 = rows.iter().map(|r| r.traced.row_entries).sum();
+    let begun_s = cpu_seconds();
+    for rows in &rows {
+        assert_eq!(blake3::hash(&rows.packed).as_bytes().len(), 32);
+        packed::check(&rows.packed, shape, rows.traced.row_entries).unwrap();
+    }
+    let check_s = cpu_seconds() - begun_s;
+    let begun_s = cpu_seconds();
+    let jobs: Arc<[JobOf]> = jobs.into();
+    let mut assembly = Assembly::new(world, blocks, jobs, 1);
+    for (job, rows) in rows.drain(..).enumerate() {
+        assembly.put(job, rows).unwrap();
+    }
+    assert!(assembly.finish(JobCounts::default()).is_some());
+    [check_s, cpu_seconds() - begun_s].map(|s| s / entries as f64)
 }
 
 impl fmt::Display for Recorded {
@@ -145,34 +184,39 @@ impl fmt::Display for Recorded {
         let mut took: Vec<f64> = self.jobs.iter().map(|j| j.took_s).collect();
         took.sort_by(f64::total_cmp);
         let bytes: u64 = self.jobs.iter().map(|j| j.bytes).sum();
-        let total_s: f64 = took.iter().sum();
+        let entries: u64 = self.jobs.iter().map(|j| j.entries).sum();
         let cost_s: f64 = self.jobs.iter().map(|j| j.cost_s).sum();
+        let rays = self.jobs.iter().filter(|j| j.rays).count();
         writeln!(f, "triangles {}", self.triangles)?;
         writeln!(
             f,
-            "jobs {}, of which measured {}",
+            "jobs {}, {rays} with rays, measured {}",
             self.jobs.len(),
             self.measured
         )?;
         writeln!(
             f,
-            "a job: least {:.3} s, median {:.3} s, most {:.3} s; all {total_s:.1} s, expected {cost_s:.1} s",
+            "a job: least {:.3} s, median {:.3} s, most {:.3} s; all {:.1} s, expected {cost_s:.1} s",
             took[0],
             took[took.len() / 2],
-            took[took.len() - 1]
+            took[took.len() - 1],
+            self.jobs_s()
         )?;
         writeln!(
             f,
-            "results {:.1} MB; entries of the measured ones {}",
+            "results {:.1} MB, {:.2} bytes an entry; the master takes {:.1} ns to check one and {:.1} ns to join it",
             bytes as f64 * 1e-6,
-            self.entries
+            bytes as f64 / entries as f64,
+            self.check_s * 1e9,
+            self.join_s * 1e9
         )?;
         write!(
             f,
-            "block {:.1} MB, ready in {:.2} s, with tree {:.2} s",
+            "block {:.1} MB, {:.1} bytes a triangle, ready in {:.2} s, its tree in {:.2} s",
             self.block_bytes as f64 * 1e-6,
-            self.ready_s[0],
-            self.ready_s[1]
+            self.block_bytes as f64 / self.triangles as f64,
+            self.ready_s,
+            self.tree_s
         )
     }
 }

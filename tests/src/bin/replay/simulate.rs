@@ -1,7 +1,7 @@
 //! Workers that take the time that real ones took, under the real scheduler.
 
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BTreeMap, BinaryHeap};
 use std::time::Duration;
 
 use nestrad_master::cluster::scheduler::{
@@ -10,23 +10,26 @@ use nestrad_master::cluster::scheduler::{
 
 use super::record::Recorded;
 
-/// What lies between master and workers: one link at the master, which all share.
+/// Workers, and what lies between them and the master: one link at the master, which all share.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Network {
+pub(crate) struct Setting {
+    pub(crate) workers: u32,
+    pub(crate) threads_each: u32,
     pub(crate) bytes_per_s: f64,
     /// Of a call.
     pub(crate) latency_s: f64,
     /// Workers hold the block from an earlier solve.
     pub(crate) blocks_held: bool,
+    /// Threads on which the master checks and joins.
+    pub(crate) master_threads: u32,
 }
 
 /// How a simulated solve went.
 pub(crate) struct Run {
+    /// Until the last batch is joined.
     pub(crate) wall_s: f64,
-    /// Time of all jobs over wall clock times workers.
+    /// Time of all jobs over wall clock times threads.
     pub(crate) efficiency: f64,
-    /// Part of the time in which the link is busy.
-    pub(crate) network: f64,
 }
 
 /// What happens, by time in nanoseconds, then in the order in which it was planned.
@@ -34,47 +37,31 @@ type Event = Reverse<(u64, u64, What)>;
 
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum What {
-    /// A worker asks for a job.
+    /// A thread asks for a job.
     Ask(usize),
-    /// A worker has computed its job.
+    /// A thread has computed its job.
     Computed(usize),
-    /// A worker's result has come.
-    Returned(usize),
+    /// A thread's result has come.
+    Came(usize),
+    /// It is checked.
+    Checked(usize),
 }
 
 struct Worker {
     id: Id,
-    ready: bool,
-    /// It has built the tree for rays.
-    tree: bool,
+    /// When it has its block, and its tree, or will have.
+    block_s: Option<f64>,
+    tree_s: Option<f64>,
+}
+
+/// A thread of a worker.
+#[derive(Clone, Default)]
+struct Thread {
+    worker: usize,
     computing: Option<Leased>,
     /// What is computed waits for the result before it to be through.
     waits: bool,
     returning: Option<Leased>,
-}
-
-impl Worker {
-    /// Sends the result that is ready, unless one is on its way; and asks for the next job.
-    fn send(
-        &mut self,
-        w: usize,
-        now_s: f64,
-        recorded: &Recorded,
-        network: Network,
-        (link, clock): (&mut Link, &mut Clock),
-    ) {
-        if !self.waits || self.returning.is_some() {
-            return;
-        }
-        self.waits = false;
-        self.returning = self.computing.take();
-        if let Some(leased) = self.returning {
-            let bytes = recorded.jobs[leased.job].bytes as f64;
-            let through_s = link.send(now_s + network.latency_s, bytes / network.bytes_per_s);
-            clock.at(through_s, What::Returned(w));
-        }
-        clock.at(now_s, What::Ask(w));
-    }
 }
 
 /// What is to happen.
@@ -97,24 +84,22 @@ impl Clock {
     }
 }
 
-/// A link that sends one thing after the other.
+/// What does one thing after the other.
 #[derive(Default)]
-struct Link {
+struct Line {
     free_s: f64,
-    busy_s: f64,
 }
 
-impl Link {
-    /// When something is through that takes so long and may begin at `at_s`.
-    fn send(&mut self, at_s: f64, takes_s: f64) -> f64 {
+impl Line {
+    /// When something is done that takes so long and may begin at `at_s`.
+    fn do_for(&mut self, at_s: f64, takes_s: f64) -> f64 {
         self.free_s = self.free_s.max(at_s) + takes_s;
-        self.busy_s += takes_s;
         self.free_s
     }
 }
 
 /// Replays a recorded solve.
-pub(crate) fn simulate(recorded: &Recorded, workers: u32, network: Network) -> Run {
+pub(crate) fn simulate(recorded: &Recorded, setting: Setting) -> Run {
     let mut scheduler = Scheduler::new(Rules::default(), 1);
     let jobs = recorded.jobs.iter().map(|j| JobSpec {
         block: 0,
@@ -125,77 +110,160 @@ pub(crate) fn simulate(recorded: &Recorded, workers: u32, network: Network) -> R
         demand: recorded.demand,
     };
     scheduler.begin(vec![block], jobs.collect());
-    let mut crew: Vec<Worker> = (0..workers)
-        .map(|_| Worker {
-            id: scheduler.join(
-                Duration::ZERO,
-                WorkerFacts {
-                    name: String::new(),
-                    threads: 1,
-                    memory_bytes: 1 << 40,
-                },
-            ),
-            ready: network.blocks_held,
-            tree: false,
-            computing: None,
-            waits: false,
-            returning: None,
-        })
-        .collect();
-    let mut clock = Clock::default();
-    let mut link = Link::default();
-    for w in 0..crew.len() {
-        clock.at(0.0, What::Ask(w));
+    let workers = (0..setting.workers).map(|_| Worker {
+        id: scheduler.join(
+            Duration::ZERO,
+            WorkerFacts {
+                name: String::new(),
+                threads: setting.threads_each,
+                memory_bytes: 1 << 40,
+            },
+        ),
+        block_s: setting.blocks_held.then_some(0.0),
+        tree_s: None,
+    });
+    let mut replay = Replay {
+        recorded,
+        setting,
+        workers: workers.collect(),
+        threads: (0..setting.workers * setting.threads_each)
+            .map(|t| Thread {
+                worker: (t % setting.workers) as usize,
+                ..Thread::default()
+            })
+            .collect(),
+        scheduler,
+        clock: Clock::default(),
+        link: Line::default(),
+        master: Line::default(),
+        joining: BTreeMap::new(),
+        left: recorded.jobs.len(),
+        wall_s: 0.0,
+    };
+    for job in &recorded.jobs {
+        replay.joining.entry(job.batch).or_default().0 += 1;
     }
-    let (mut left, mut wall_s) = (recorded.jobs.len(), 0.0);
-    while let Some((now_s, what)) = clock.next() {
+    for thread in 0..replay.threads.len() {
+        replay.clock.at(0.0, What::Ask(thread));
+    }
+    while let Some((now_s, what)) = replay.clock.next() {
+        replay.step(now_s, what);
+    }
+    let threads = f64::from(setting.workers * setting.threads_each);
+    Run {
+        wall_s: replay.wall_s,
+        efficiency: recorded.jobs_s() / (replay.wall_s * threads),
+    }
+}
+
+struct Replay<'a> {
+    recorded: &'a Recorded,
+    setting: Setting,
+    scheduler: Scheduler,
+    workers: Vec<Worker>,
+    threads: Vec<Thread>,
+    clock: Clock,
+    link: Line,
+    /// The master's threads, all at one thing.
+    master: Line,
+    /// By batch: jobs that are not in, and entries of those that are.
+    joining: BTreeMap<u32, (usize, u64)>,
+    left: usize,
+    wall_s: f64,
+}
+
+impl Replay<'_> {
+    fn step(&mut self, now_s: f64, what: What) {
         let now = Duration::from_secs_f64(now_s);
         match what {
-            What::Ask(w) => {
-                let worker = &mut crew[w];
-                let _ = scheduler.renew(now, worker.id, &[]);
-                let Ok(Some(leased)) = scheduler.lease(now, worker.id, &[[1; 32]]) else {
+            What::Ask(t) => {
+                let worker = self.threads[t].worker;
+                let id = self.workers[worker].id;
+                let _ = self.scheduler.renew(now, id, &[]);
+                let Ok(Some(leased)) = self.scheduler.lease(now, id, &[[1; 32]]) else {
                     // the master looks for stragglers that often
-                    if left > 0 {
-                        clock.at(now_s + 0.1, What::Ask(w));
+                    if self.left > 0 {
+                        self.clock.at(now_s + 0.1, What::Ask(t));
                     }
-                    continue;
+                    return;
                 };
-                let mut begins_s = now_s + network.latency_s;
-                if !worker.ready {
-                    worker.ready = true;
-                    let sent = recorded.block_bytes as f64 / network.bytes_per_s;
-                    begins_s = link.send(begins_s, sent) + recorded.ready_s[0];
-                }
-                if recorded.jobs[leased.job].rays && !worker.tree {
-                    worker.tree = true;
-                    begins_s += recorded.ready_s[1] - recorded.ready_s[0];
-                }
-                worker.computing = Some(leased);
-                let takes_s = recorded.jobs[leased.job].took_s;
-                clock.at(begins_s + takes_s, What::Computed(w));
+                let job = self.recorded.jobs[leased.job];
+                let begins_s = self.ready_s(worker, now_s + self.setting.latency_s, job.rays);
+                self.threads[t].computing = Some(leased);
+                self.clock.at(begins_s + job.took_s, What::Computed(t));
             }
-            What::Computed(w) => {
-                crew[w].waits = true;
-                crew[w].send(w, now_s, recorded, network, (&mut link, &mut clock));
+            What::Computed(t) => {
+                self.threads[t].waits = true;
+                self.send(t, now_s);
             }
-            What::Returned(w) => {
-                if let Some(leased) = crew[w].returning.take() {
-                    let took_s = recorded.jobs[leased.job].took_s;
-                    let used = scheduler.finish(now, crew[w].id, leased.lease, took_s);
+            What::Came(t) => {
+                let leased = self.threads[t].returning;
+                let entries = leased.map_or(0, |l| self.recorded.jobs[l.job].entries);
+                let takes_s = self.recorded.check_s * entries as f64;
+                let done_s = self.work(now_s, takes_s);
+                self.clock.at(done_s, What::Checked(t));
+            }
+            What::Checked(t) => {
+                if let Some(leased) = self.threads[t].returning.take() {
+                    let job = self.recorded.jobs[leased.job];
+                    let id = self.workers[self.threads[t].worker].id;
+                    let used = self.scheduler.finish(now, id, leased.lease, job.took_s);
                     if used.is_some() {
-                        left -= 1;
-                        wall_s = now_s;
+                        self.left -= 1;
+                        self.put(now_s, job.batch, job.entries);
                     }
                 }
-                crew[w].send(w, now_s, recorded, network, (&mut link, &mut clock));
+                self.send(t, now_s);
             }
         }
     }
-    let total_s: f64 = recorded.jobs.iter().map(|j| j.took_s).sum();
-    Run {
-        wall_s,
-        efficiency: total_s / (wall_s * f64::from(workers)),
-        network: link.busy_s / wall_s,
+
+    /// When a worker can begin that may begin at `at_s`.
+    fn ready_s(&mut self, worker: usize, at_s: f64, rays: bool) -> f64 {
+        let of = &mut self.workers[worker];
+        let takes_s = self.recorded.block_bytes as f64 / self.setting.bytes_per_s;
+        let block_s = *of
+            .block_s
+            .get_or_insert_with(|| self.link.do_for(at_s, takes_s) + self.recorded.ready_s);
+        let ready_s = at_s.max(block_s);
+        if !rays {
+            return ready_s;
+        }
+        let tree_s = *of.tree_s.get_or_insert(ready_s + self.recorded.tree_s);
+        ready_s.max(tree_s)
+    }
+
+    /// Sends the result that is ready, unless one is on its way; and asks for the next job.
+    fn send(&mut self, t: usize, now_s: f64) {
+        let thread = &mut self.threads[t];
+        if !thread.waits || thread.returning.is_some() {
+            return;
+        }
+        thread.waits = false;
+        thread.returning = thread.computing.take();
+        if let Some(leased) = thread.returning {
+            let bytes = self.recorded.jobs[leased.job].bytes as f64;
+            let takes_s = bytes / self.setting.bytes_per_s;
+            let through_s = self.link.do_for(now_s + self.setting.latency_s, takes_s);
+            self.clock.at(through_s, What::Came(t));
+        }
+        self.clock.at(now_s, What::Ask(t));
+    }
+
+    /// A job's result is in; with the last one of its batch that is joined.
+    fn put(&mut self, now_s: f64, batch: u32, entries: u64) {
+        let (left, all) = self.joining.entry(batch).or_default();
+        *left -= 1;
+        *all += entries;
+        if *left == 0 {
+            let takes_s = self.recorded.join_s * *all as f64;
+            self.wall_s = self.work(now_s, takes_s).max(self.wall_s);
+        }
+    }
+
+    /// When the master is done with something that takes one thread so long.
+    fn work(&mut self, now_s: f64, takes_s: f64) -> f64 {
+        let threads = f64::from(self.setting.master_threads);
+        self.master.do_for(now_s, takes_s / threads)
     }
 }
