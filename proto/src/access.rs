@@ -10,8 +10,9 @@ use tonic::transport::server::Server;
 use tonic::transport::{Certificate, Identity, ServerTlsConfig};
 use tower::layer::util::{Identity as NoLayer, Stack};
 
+use crate::authority::{Authority, AuthorityError};
 use crate::channel::{CONNECTION_WINDOW, KEEP_ALIVE, PemError, STREAM_WINDOW, pem};
-use crate::guard::Guard;
+use crate::guard::{Credential, Guard};
 use crate::token::{Token, TokenError};
 
 /// A caller that has not agreed on keys after this is sent away.
@@ -35,9 +36,14 @@ pub struct Access {
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     pub tls_key: Option<PathBuf>,
 
-    /// Let in only callers with a certificate of this authority, PEM
+    /// Authority of the clients, PEM: who has a certificate of it may solve
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     pub client_ca: Option<PathBuf>,
+
+    /// Authority of the workers, PEM: who has a certificate of it may compute for this master, and nothing
+    /// else
+    #[arg(long, value_name = "FILE", requires = "tls_cert")]
+    pub worker_ca: Option<PathBuf>,
 
     /// File with the token of clients: who shows it may solve
     #[arg(long, value_name = "FILE")]
@@ -59,16 +65,21 @@ impl Access {
     /// A server for `address` to which services can be added. Refused where other machines could read
     /// along or come in without credentials.
     pub fn server(&self, address: SocketAddr) -> Result<GuardedServer, AccessError> {
+        let credential = |token: &Option<PathBuf>, authority: &Option<PathBuf>| {
+            Ok::<_, AccessError>(Credential {
+                token: token.as_deref().map(Token::read).transpose()?,
+                authority: authority.as_deref().map(Authority::read).transpose()?,
+            })
+        };
         let guard = Guard {
-            client: self.client_token.as_deref().map(Token::read).transpose()?,
-            worker: self.worker_token.as_deref().map(Token::read).transpose()?,
-            certificate: self.client_ca.is_some(),
+            client: credential(&self.client_token, &self.client_ca)?,
+            worker: credential(&self.worker_token, &self.worker_ca)?,
         };
         if !address.ip().is_loopback() {
             if self.tls_cert.is_none() && !self.allow_plaintext {
                 return Err(AccessError::Plaintext { address });
             }
-            if guard.client.is_none() && guard.worker.is_none() && !guard.certificate {
+            if guard.client.is_empty() && guard.worker.is_empty() {
                 return Err(AccessError::Open { address });
             }
         }
@@ -84,10 +95,15 @@ impl Access {
             let mut setup = ServerTlsConfig::new()
                 .identity(Identity::from_pem(pem(cert)?, pem(key)?))
                 .timeout(HANDSHAKE);
-            if let Some(path) = &self.client_ca {
+            let mut authorities = Vec::new();
+            for path in [&self.client_ca, &self.worker_ca].into_iter().flatten() {
+                authorities.extend(pem(path)?);
+                authorities.push(b'\n');
+            }
+            if !authorities.is_empty() {
                 // health is answered without a certificate; the guard sees to the rest
                 setup = setup
-                    .client_ca_root(Certificate::from_pem(pem(path)?))
+                    .client_ca_root(Certificate::from_pem(authorities))
                     .client_auth_optional(true);
             }
             server = server.tls_config(setup).map_err(AccessError::Tls)?;
@@ -109,7 +125,7 @@ pub enum AccessError {
     },
     /// Anybody could come in.
     #[error(
-        "{address} is reached from other machines: expected --client-token and --worker-token, or --client-ca"
+        "{address} is reached from other machines: expected --client-token and --worker-token, or --client-ca and --worker-ca"
     )]
     Open {
         /// Where it was to listen.
@@ -118,6 +134,9 @@ pub enum AccessError {
     /// A certificate or key cannot be used.
     #[error(transparent)]
     Pem(#[from] PemError),
+    /// An authority cannot be used.
+    #[error(transparent)]
+    Authority(#[from] AuthorityError),
     /// A token cannot be used.
     #[error(transparent)]
     Token(#[from] TokenError),

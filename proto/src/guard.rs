@@ -1,7 +1,7 @@
 //! Who may call what: a layer in front of all services of a master.
 //!
-//! Anybody may ask for the master's health. A client's token opens the client service, a worker's
-//! token the worker service, either one the reflection service.
+//! Anybody may ask for the master's health. What a client shows opens the client service, what a worker
+//! shows the worker service, either one the reflection service.
 
 use std::pin::Pin;
 use std::sync::Arc;
@@ -9,53 +9,89 @@ use std::task::{Context, Poll};
 
 use http::header::AUTHORIZATION;
 use http::{Request, Response};
+use rustls::pki_types::CertificateDer;
 use tonic::Status;
 use tonic::transport::server::{TcpConnectInfo, TlsConnectInfo};
 use tower::{Layer, Service};
 
+use crate::authority::Authority;
 use crate::token::Token;
 use crate::v1::{solve_service_server, worker_service_server};
 
 const HEALTH: &str = "grpc.health.v1.Health";
 
-/// What a caller must show.
+/// What callers must show. With nothing to show for either service, both are open.
 #[derive(Clone, Debug, Default)]
 pub struct Guard {
     /// Opens the client service.
-    pub client: Option<Token>,
-    /// Opens the worker service. With neither token, both services are open.
-    pub worker: Option<Token>,
-    /// Whether the connection must have shown a certificate besides.
-    pub certificate: bool,
+    pub client: Credential,
+    /// Opens the worker service.
+    pub worker: Credential,
+}
+
+/// What opens a service: all of it must be shown. Without anything, nobody is let in.
+#[derive(Clone, Debug, Default)]
+pub struct Credential {
+    /// A token.
+    pub token: Option<Token>,
+    /// A certificate of this authority.
+    pub authority: Option<Authority>,
+}
+
+/// What a caller shows.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shown<'a> {
+    header: Option<&'a [u8]>,
+    chain: &'a [CertificateDer<'static>],
+}
+
+impl Credential {
+    /// Whether there is nothing to show.
+    pub fn is_empty(&self) -> bool {
+        self.token.is_none() && self.authority.is_none()
+    }
+
+    fn is_in(&self, shown: Shown) -> bool {
+        let token = |token: &Token| shown.header.is_some_and(|header| token.is_in(header));
+        let authority = |authority: &Authority| authority.stands_behind(shown.chain);
+        !self.is_empty()
+            && self.token.as_ref().is_none_or(token)
+            && self.authority.as_ref().is_none_or(authority)
+    }
+
+    /// What to show.
+    fn wanted(&self) -> &'static str {
+        match (&self.token, &self.authority) {
+            (Some(_), None) => "a bearer token",
+            (None, Some(_)) => "a certificate",
+            (Some(_), Some(_)) => "a bearer token and a certificate",
+            (None, None) => "credentials that nobody has",
+        }
+    }
 }
 
 impl Guard {
-    /// Whether the caller of `path` with these credentials is let in.
-    fn check(&self, path: &str, header: Option<&[u8]>, certificate: bool) -> Result<(), Status> {
+    /// Whether the caller of `path` is let in.
+    fn check(&self, path: &str, shown: Shown) -> Result<(), Status> {
         let service = path.split('/').nth(1).unwrap_or_default();
-        if service == HEALTH {
+        if service == HEALTH || (self.client.is_empty() && self.worker.is_empty()) {
             return Ok(());
         }
-        if self.certificate && !certificate {
-            return Err(Status::unauthenticated("expected a client certificate"));
-        }
-        if self.client.is_none() && self.worker.is_none() {
-            return Ok(());
-        }
-        let shows = |token: &Option<Token>| {
-            let both = token.as_ref().zip(header);
-            both.is_some_and(|(token, header)| token.is_in(header))
+        let (wanted, other) = match service {
+            solve_service_server::SERVICE_NAME => (&self.client, &self.worker),
+            worker_service_server::SERVICE_NAME => (&self.worker, &self.client),
+            // reflection is open to both
+            _ if self.worker.is_in(shown) => return Ok(()),
+            _ => (&self.client, &self.client),
         };
-        let (client, worker) = (shows(&self.client), shows(&self.worker));
-        match service {
-            _ if !client && !worker => Err(Status::unauthenticated("expected a bearer token")),
-            solve_service_server::SERVICE_NAME if !client => Err(Status::permission_denied(
-                "expected a client's token, found a worker's",
-            )),
-            worker_service_server::SERVICE_NAME if !worker => Err(Status::permission_denied(
-                "expected a worker's token, found a client's",
-            )),
-            _ => Ok(()),
+        if wanted.is_in(shown) {
+            Ok(())
+        } else if other.is_in(shown) {
+            let text = "these credentials are for another service";
+            Err(Status::permission_denied(text))
+        } else {
+            let text = format!("expected {}", wanted.wanted());
+            Err(Status::unauthenticated(text))
         }
     }
 }
@@ -95,12 +131,15 @@ where
 
     fn call(&mut self, request: Request<Sent>) -> Self::Future {
         let header = request.headers().get(AUTHORIZATION);
-        let shown = request
+        let chain = request
             .extensions()
             .get::<TlsConnectInfo<TcpConnectInfo>>()
-            .is_some_and(|info| info.peer_certs().is_some());
-        let path = request.uri().path();
-        match self.guard.check(path, header.map(|h| h.as_bytes()), shown) {
+            .and_then(|info| info.peer_certs());
+        let shown = Shown {
+            header: header.map(|h| h.as_bytes()),
+            chain: chain.as_ref().map_or(&[], |chain| &chain[..]),
+        };
+        match self.guard.check(request.uri().path(), shown) {
             Ok(()) => Box::pin(self.inner.call(request)),
             Err(status) => Box::pin(std::future::ready(Ok(status.into_http()))),
         }
@@ -109,24 +148,32 @@ where
 
 #[cfg(test)]
 mod tests {
-    use super::*;
+    use rcgen::{BasicConstraints, CertificateParams, DnType, IsCa, Issuer, KeyPair};
     use tonic::Code;
+
+    use super::*;
 
     const SOLVE: &str = "/nestrad.v1.SolveService/Status";
     const LEASE: &str = "/nestrad.v1.WorkerService/Lease";
     const REFLECTION: &str = "/grpc.reflection.v1.ServerReflection/ServerReflectionInfo";
 
     fn guard() -> Guard {
+        let credential = |token| Credential {
+            token: Some(Token::new(token).unwrap()),
+            authority: None,
+        };
         Guard {
-            client: Some(Token::new("client-client-client").unwrap()),
-            worker: Some(Token::new("worker-worker-worker").unwrap()),
-            certificate: false,
+            client: credential("client-client-client"),
+            worker: credential("worker-worker-worker"),
         }
     }
 
     fn code(guard: &Guard, path: &str, header: &str) -> Option<Code> {
-        let header = (!header.is_empty()).then_some(header.as_bytes());
-        guard.check(path, header, false).err().map(|s| s.code())
+        let shown = Shown {
+            header: (!header.is_empty()).then_some(header.as_bytes()),
+            chain: &[],
+        };
+        guard.check(path, shown).err().map(|s| s.code())
     }
 
     #[test]
@@ -172,7 +219,7 @@ mod tests {
     #[test]
     fn one_token_alone_keeps_the_other_service_closed() {
         let guard = Guard {
-            worker: None,
+            worker: Credential::default(),
             ..guard()
         };
         assert_eq!(code(&guard, LEASE, ""), Some(Code::Unauthenticated));
@@ -181,13 +228,64 @@ mod tests {
     }
 
     #[test]
-    fn a_certificate_that_is_asked_for_must_be_shown() {
-        let guard = Guard {
-            certificate: true,
-            ..Guard::default()
+    fn each_authority_opens_its_own_service() {
+        let folder = tempfile::tempdir().unwrap();
+        let authority = |name: &str| {
+            let mut params = CertificateParams::new(Vec::new()).unwrap();
+            params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+            params.distinguished_name.push(DnType::CommonName, name);
+            let key = KeyPair::generate().unwrap();
+            let path = folder.path().join(name);
+            std::fs::write(&path, params.self_signed(&key).unwrap().pem()).unwrap();
+            let issuer = Issuer::new(params, key);
+            let own = CertificateParams::new(vec!["caller".to_owned()]).unwrap();
+            let signed = own.signed_by(&KeyPair::generate().unwrap(), &issuer);
+            let chain = [signed.unwrap().der().clone()];
+            (Authority::read(&path).unwrap(), chain)
         };
-        assert_eq!(code(&guard, SOLVE, ""), Some(Code::Unauthenticated));
-        assert!(guard.check(SOLVE, None, true).is_ok());
-        assert_eq!(code(&guard, "/grpc.health.v1.Health/Check", ""), None);
+        let [(clients, client), (workers, worker), (_, stranger)] =
+            ["clients", "workers", "strangers"].map(authority);
+        let by = |authority| Credential {
+            token: None,
+            authority: Some(authority),
+        };
+        let guard = Guard {
+            client: by(clients),
+            worker: by(workers),
+        };
+        let code = |path, chain: &[CertificateDer<'static>]| {
+            let shown = Shown {
+                header: None,
+                chain,
+            };
+            guard.check(path, shown).err().map(|s| s.code())
+        };
+        assert_eq!(code(SOLVE, &client), None);
+        assert_eq!(code(LEASE, &worker), None);
+        assert_eq!(code(SOLVE, &worker), Some(Code::PermissionDenied));
+        assert_eq!(code(LEASE, &client), Some(Code::PermissionDenied));
+        for path in [SOLVE, LEASE, REFLECTION] {
+            assert_eq!(code(path, &stranger), Some(Code::Unauthenticated));
+            assert_eq!(code(path, &[]), Some(Code::Unauthenticated));
+        }
+        for chain in [&client, &worker] {
+            assert_eq!(code(REFLECTION, chain), None);
+        }
+        assert_eq!(code("/grpc.health.v1.Health/Check", &[]), None);
+    }
+
+    #[test]
+    fn a_token_and_a_certificate_must_both_be_shown() {
+        let mut guard = guard();
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("ca");
+        let key = KeyPair::generate().unwrap();
+        let mut params = CertificateParams::new(Vec::new()).unwrap();
+        params.is_ca = IsCa::Ca(BasicConstraints::Unconstrained);
+        std::fs::write(&path, params.self_signed(&key).unwrap().pem()).unwrap();
+        guard.client.authority = Some(Authority::read(&path).unwrap());
+        let header = "Bearer client-client-client";
+        assert_eq!(code(&guard, SOLVE, header), Some(Code::Unauthenticated));
+        assert_eq!(code(&guard, LEASE, "Bearer worker-worker-worker"), None);
     }
 }

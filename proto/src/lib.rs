@@ -4,6 +4,7 @@
 #![allow(non_snake_case, reason = "units in names are written as units")]
 
 pub mod access;
+pub mod authority;
 mod bits;
 pub mod channel;
 pub mod guard;

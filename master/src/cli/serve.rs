@@ -34,6 +34,10 @@ pub(crate) struct ServeArgs {
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
 
+    /// Without any worker for so long, the master computes by itself, seconds
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
+    patience: Duration,
+
     #[command(flatten)]
     state: StateFlags,
 
@@ -128,7 +132,10 @@ impl ServeArgs {
                 _ = interrupt.recv() => {}
             }
         };
-        let workers = cluster::Limits::default().with_lease(self.lease);
+        let workers = cluster::Limits {
+            patience: self.patience,
+            ..cluster::Limits::default().with_lease(self.lease)
+        };
         let kept = self.state.open()?;
         let threads = self.limits.threads.into();
         let service = Service::new(self.limits.limits(), workers, kept, threads)?;

@@ -30,6 +30,10 @@ pub(crate) struct WorkersFlags {
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
 
+    /// Without any worker for so long, this process computes by itself, seconds
+    #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
+    patience: Duration,
+
     #[command(flatten)]
     access: Access,
 }
@@ -55,7 +59,10 @@ impl WorkersFlags {
         }
         let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let threads = rayon::current_num_threads();
-        let limits = Limits::default().with_lease(self.lease);
+        let limits = Limits {
+            patience: self.patience,
+            ..Limits::default().with_lease(self.lease)
+        };
         let door = Door::open(self.listen.unwrap_or(here), &self.access, limits, threads)?;
         if self.listen.is_some() {
             notes.say("workers", &format!("may join at {}", door.address()));
@@ -74,7 +81,7 @@ impl WorkersFlags {
     }
 }
 
-/// A lease time.
+/// A lease time, or patience.
 pub(super) fn lease(text: &str) -> Result<Duration, String> {
     let seconds = text.parse().ok().filter(|s| (0.1..=86_400.0).contains(s));
     let seconds = seconds.ok_or_else(|| "expected seconds, 0.1 to 86400".to_owned())?;

@@ -3,6 +3,7 @@
 //! The scheduler decides, without clock or network; the service speaks with workers on tokio's threads;
 //! rows are checked and joined on threads of their own.
 
+mod alone;
 pub mod door;
 pub mod local;
 mod receive;
@@ -35,6 +36,8 @@ pub struct Limits {
     pub result_bytes: u32,
     /// Workers at a time.
     pub workers: usize,
+    /// Without any worker for so long, the master computes by itself.
+    pub patience: Duration,
 }
 
 impl Default for Limits {
@@ -45,6 +48,7 @@ impl Default for Limits {
             rules,
             result_bytes: 1 << 30,
             workers: 4096,
+            patience: Duration::from_secs(60),
         }
     }
 }

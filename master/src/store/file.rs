@@ -93,6 +93,15 @@ impl File {
             .map_err(|error| error.text())
     }
 
+    /// Whether there is a result of that name.
+    pub(super) fn has(&self, key: &Key) -> bool {
+        let found = guarded(|| {
+            let begun = self.database.begin_read()?;
+            Ok(begun.open_table(RESULTS)?.get(&key[..])?.is_some())
+        });
+        found.unwrap_or(false)
+    }
+
     /// Keeps results, and lets go of the oldest ones where they are too many.
     pub(super) fn put(&mut self, results: &[(Key, JobRows)]) -> Result<(), String> {
         let written = guarded(|| {

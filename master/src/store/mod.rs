@@ -162,6 +162,12 @@ impl Store {
         }
     }
 
+    /// Whether there is a result of that name; it may turn out to be broken.
+    pub fn has(&self, key: &Key) -> bool {
+        let file = lock(&self.0.file);
+        file.as_ref().is_some_and(|file| file.has(key))
+    }
+
     /// Keeps a result, sooner or later.
     pub fn put(&self, key: Key, rows: &JobRows) {
         if self.0.closed.load(Ordering::Relaxed) {

@@ -4,9 +4,11 @@ use std::fs;
 
 use nestrad_proto::channel::{Credentials, connect};
 use nestrad_proto::v1;
+use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
 use nestrad_tests::calls::block_on;
 use nestrad_tests::desk::Desk;
 use nestrad_tests::processes::{Master, said};
+use nestrad_tests::rogue::honest_join;
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair, KeyUsagePurpose};
 use tonic::Code;
 use tonic_health::pb::HealthCheckRequest;
@@ -170,6 +172,50 @@ fn certificates_prove_the_master_and_its_callers() {
     assert!(desk.tables("here") == desk.tables("there"));
 }
 
+/// What a worker comes to that joins.
+fn joining(url: &str, credentials: &Credentials) -> Option<Code> {
+    block_on(async {
+        let mut client = WorkerServiceClient::new(connect(url, credentials).unwrap());
+        let joined = client.join(honest_join()).await;
+        joined.err().map(|e| e.code())
+    })
+}
+
+#[test]
+fn a_certificate_of_clients_opens_nothing_to_workers_nor_the_other_way_round() {
+    let desk = Desk::new();
+    let clients = Authority::new(&desk, "ca");
+    clients.certify(&desk, "master");
+    clients.certify(&desk, "client");
+    Authority::new(&desk, "worker-ca").certify(&desk, "worker");
+    let path = |name: &str| desk.path(name).display().to_string();
+    let (cert, key) = (path("master.pem"), path("master.key"));
+    let (client_ca, worker_ca) = (path("ca.pem"), path("worker-ca.pem"));
+    let tls = ["--tls-cert", &cert, "--tls-key", &key];
+    let as_one = |name: &str| Credentials {
+        ca: Some(desk.path("ca.pem")),
+        cert: Some(desk.path(&format!("{name}.pem"))),
+        key: Some(desk.path(&format!("{name}.key"))),
+        token_file: None,
+    };
+    let (client, worker) = (as_one("client"), as_one("worker"));
+    let denied = Some(Code::PermissionDenied);
+
+    let both = ["--client-ca", &client_ca, "--worker-ca", &worker_ca];
+    let master = Master::start(&[tls, both].concat());
+    let url = format!("https://{}", master.address);
+    assert_eq!(codes(&url, &client), (None, None));
+    assert_eq!(joining(&url, &worker), None);
+    assert_eq!(codes(&url, &worker), (denied, None));
+    assert_eq!(joining(&url, &client), denied);
+
+    // without an authority of the workers there are no workers
+    let master = Master::start(&[&tls[..], &["--client-ca", &client_ca]].concat());
+    let url = format!("https://{}", master.address);
+    assert_eq!(codes(&url, &client), (None, None));
+    assert_eq!(joining(&url, &client), denied);
+}
+
 #[test]
 fn other_machines_are_not_served_without_encryption_and_credentials() {
     let desk = Desk::new();
@@ -182,7 +228,7 @@ fn other_machines_are_not_served_without_encryption_and_credentials() {
         ),
         (
             &["--allow-plaintext"],
-            "--client-token and --worker-token, or --client-ca",
+            "--client-token and --worker-token, or --client-ca and --worker-ca",
         ),
     ] {
         let output = desk.run(&[&["serve", "--listen", "0.0.0.0:0"], more].concat());

@@ -181,11 +181,31 @@ impl Scheduler {
         });
     }
 
-    /// Marks a job as done without a worker: its result was kept from before.
-    pub fn known(&mut self, solve: Id, job: usize) {
-        if let Some(solve) = self.solves.get_mut(&solve) {
-            solve.done(job);
-        }
+    /// Marks a job as done without a worker: its result was kept from before, or computed here. Whether it
+    /// had none before.
+    pub fn known(&mut self, solve: Id, job: usize) -> bool {
+        let solve = self.solves.get_mut(&solve);
+        solve.is_some_and(|solve| solve.done(job))
+    }
+
+    /// Whether there is a worker that can do what is left of a solve, or some of it.
+    pub fn has_worker_for(&self, solve: Id) -> bool {
+        let Some(solve) = self.solves.get(&solve) else {
+            return false;
+        };
+        let left = |block: &usize| {
+            let block = &solve.blocks[*block];
+            !block.waiting.is_empty() || block.active > 0
+        };
+        let mut left = (0..solve.blocks.len()).filter(left);
+        left.any(|block| self.workers.values().any(|w| solve.block_fits(block, w)))
+    }
+
+    /// A job that nobody is at, and its block.
+    pub fn waiting(&self, solve: Id) -> Option<(usize, usize)> {
+        let blocks = &self.solves.get(&solve)?.blocks;
+        let mut blocks = blocks.iter().enumerate();
+        blocks.find_map(|(number, block)| Some((block.waiting.first()?.1, number)))
     }
 
     /// A job for a worker, which holds these blocks; `None` where there is nothing to do now.
