@@ -24,6 +24,7 @@ pub(super) fn join(
     world: &World,
     parts: &[(&BlockOf, Vec<JobRows>)],
 ) -> Result<BatchRows, PackedFault> {
+    let runs = world.rows().div_ceil(SORTED_TOGETHER);
     let rows_of: Vec<Vec<u32>> = parts
         .par_iter()
         .map(|(block, _)| block.rows(world))
@@ -36,12 +37,12 @@ pub(super) fn join(
                 packed: &job.packed,
                 rows,
                 ends: world.ends.len() as u32,
+                of_a_run: job.traced.row_entries as usize / runs.max(1),
             })
         })
         .collect();
     let results = parts.iter().flat_map(|(_, jobs)| jobs);
     let entries: u64 = results.map(|job| job.traced.row_entries).sum();
-    let runs = world.rows().div_ceil(SORTED_TOGETHER);
     let at_once = runs.div_ceil(entries.div_ceil(MOST_AT_ONCE).max(1) as usize);
     let (mut lengths, mut ends) = (Vec::with_capacity(world.rows()), Vec::new());
     ends.reserve_exact(entries as usize);
@@ -105,6 +106,8 @@ struct Job<'a> {
     /// The scene's row of each row of the block.
     rows: &'a [u32],
     ends: u32,
+    /// Entries of a run, on average.
+    of_a_run: usize,
 }
 
 impl Job<'_> {
@@ -114,7 +117,9 @@ impl Job<'_> {
             rows: self.rows.len() as u32,
             ends: self.ends,
         };
-        let mut laid_out = vec![Vec::new(); runs.len()];
+        // most runs have as many, give or take a quarter
+        let room = self.of_a_run / 4 * 5;
+        let mut laid_out: Vec<Vec<u64>> = runs.clone().map(|_| Vec::with_capacity(room)).collect();
         let mut put = |row: u32, end: u32| {
             let (run, place) = (
                 row as usize / SORTED_TOGETHER,

@@ -1,10 +1,11 @@
 //! The file of a store: one redb database.
 
+use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use bytes::Bytes;
-use redb::{Database, DatabaseError, ReadableDatabase, ReadableTable, TableDefinition};
+use redb::{Database, DatabaseError, ReadableDatabase, ReadableTable, Table, TableDefinition};
 
 use super::Key;
 use crate::exchange::{JobRows, Traced};
@@ -23,11 +24,20 @@ const CACHE_BYTES: usize = 16 << 20;
 
 pub(super) struct File {
     database: Database,
+    path: PathBuf,
     /// Of all results.
     bytes: u64,
+    /// Of the file.
     most_bytes: u64,
     next: u64,
 }
+
+/// A file grows by doubling, and has pages of powers of two: so that it never exceeds its bound, it is made to
+/// take no more than half of that between writes, and results no more than a quarter. No file is smaller than
+/// `LEAST_BYTES`.
+const AT_REST: u64 = 2;
+const FILLED: u64 = 4;
+const LEAST_BYTES: u64 = 2 << 20;
 
 pub(super) enum FileError {
     InUse,
@@ -72,10 +82,60 @@ impl File {
         })
         .map(|(bytes, next)| Self {
             database,
+            path: path.to_owned(),
             bytes,
             most_bytes,
             next,
         })
+        .and_then(|mut file| file.bound().map(|()| file))
+    }
+
+    /// Length of the file.
+    fn length(&self) -> u64 {
+        fs::metadata(&self.path).map_or(0, |file| file.len())
+    }
+
+    /// Most bytes of all results.
+    fn most_results(&self) -> u64 {
+        self.most_bytes / FILLED
+    }
+
+    /// Makes the file as small as it is to be: lets go of the oldest results, and of the room of those that
+    /// are gone.
+    fn bound(&mut self) -> Result<(), FileError> {
+        let mut most = self.most_results();
+        let at_rest = (self.most_bytes / AT_REST).max(LEAST_BYTES);
+        if self.bytes > most {
+            self.drop_to(most)?;
+        }
+        while self.length() > at_rest {
+            let database = &mut self.database;
+            guarded(|| {
+                while database.compact()? {}
+                Ok(())
+            })?;
+            if self.length() <= at_rest || self.bytes == 0 {
+                break;
+            }
+            most = most.min(self.bytes) / 4 * 3;
+            self.drop_to(most)?;
+        }
+        Ok(())
+    }
+
+    fn drop_to(&mut self, most: u64) -> Result<(), FileError> {
+        let mut bytes = self.bytes;
+        self.bytes = guarded(|| {
+            let begun = self.database.begin_write()?;
+            {
+                let mut by_name = begun.open_table(RESULTS)?;
+                let mut order = begun.open_table(ORDER)?;
+                drop_oldest(&mut by_name, &mut order, &mut bytes, most)?;
+            }
+            begun.commit()?;
+            Ok(bytes)
+        })?;
+        Ok(())
     }
 
     pub(super) fn bytes(&self) -> u64 {
@@ -104,6 +164,23 @@ impl File {
 
     /// Keeps results, and lets go of the oldest ones where they are too many.
     pub(super) fn put(&mut self, results: &[(Key, JobRows)]) -> Result<(), String> {
+        // what is written at a time stands beside what it takes the place of
+        let most = (self.most_results() / 2).max(1) as usize;
+        let mut taken = 0;
+        let together = results.chunk_by(|(_, a), (_, b)| {
+            taken = if taken == 0 { a.packed.len() } else { taken } + b.packed.len();
+            let fits = taken <= most;
+            taken = if fits { taken } else { 0 };
+            fits
+        });
+        for some in together {
+            self.write(some)?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, results: &[(Key, JobRows)]) -> Result<(), String> {
+        let most = self.most_results();
         let written = guarded(|| {
             let (mut bytes, mut next) = (self.bytes, self.next);
             let begun = self.database.begin_write()?;
@@ -113,7 +190,7 @@ impl File {
                 for (key, rows) in results {
                     let value = pack(rows);
                     let size = value.len() as u64;
-                    if size > self.most_bytes {
+                    if size > most {
                         continue;
                     }
                     // a broken one is written over, and keeps its place
@@ -122,22 +199,33 @@ impl File {
                     }
                     order.insert(next, (&key[..], size))?;
                     (bytes, next) = (bytes + size, next + 1);
-                    while bytes > self.most_bytes {
-                        let Some((_, oldest)) = order.pop_first()? else {
-                            break;
-                        };
-                        let (name, size) = oldest.value();
-                        by_name.remove(name)?;
-                        bytes -= size;
-                    }
+                    drop_oldest(&mut by_name, &mut order, &mut bytes, most)?;
                 }
             }
             begun.commit()?;
             Ok((bytes, next))
         });
-        (self.bytes, self.next) = written.map_err(|error| error.text())?;
-        Ok(())
+        (self.bytes, self.next) = written.map_err(FileError::text)?;
+        self.bound().map_err(FileError::text)
     }
+}
+
+/// Lets go of the oldest results until they take no more than that.
+fn drop_oldest(
+    by_name: &mut Table<&[u8], &[u8]>,
+    order: &mut Table<u64, (&[u8], u64)>,
+    bytes: &mut u64,
+    most: u64,
+) -> Result<(), redb::Error> {
+    while *bytes > most {
+        let Some((_, oldest)) = order.pop_first()? else {
+            break;
+        };
+        let (name, size) = oldest.value();
+        by_name.remove(name)?;
+        *bytes -= size;
+    }
+    Ok(())
 }
 
 impl FileError {

@@ -43,30 +43,67 @@ fn what_was_put_is_there_after_reopening() {
     assert_eq!(store.get(&[1; 32], Shape { rows: 9, ..SHAPE }), None);
 }
 
+fn length(folder: &Path) -> u64 {
+    fs::metadata(folder.join("results.redb")).unwrap().len()
+}
+
+fn name(k: u32) -> Key {
+    let mut name = [0; 32];
+    name[..4].copy_from_slice(&k.to_le_bytes());
+    name
+}
+
+#[test]
+fn the_file_is_never_larger_than_it_may_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let most = 16 << 20;
+    let store = Store::open(folder.path(), most).unwrap();
+    let mut longest = 0;
+    // of all sizes, many times what fits
+    for k in 0..3000u32 {
+        store.put(name(k), &rows(100 + k * 7_919 % 9_800, (k % 250) as u8));
+        longest = length(folder.path()).max(longest);
+    }
+    store.close();
+    assert_eq!(store.warning(), None);
+    longest = length(folder.path()).max(longest);
+    assert!(longest <= most, "{longest} bytes");
+    assert!(
+        store.bytes() > most / 16,
+        "{} bytes are kept",
+        store.bytes()
+    );
+    drop(store);
+    // it is to be smaller now
+    let store = Store::open(folder.path(), most / 2).unwrap();
+    assert!(length(folder.path()) <= most / 2);
+    assert!(store.bytes() > 0);
+}
+
 #[test]
 fn the_oldest_go_first_when_it_is_full() {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path(), 10_000).unwrap();
-    for name in 0..20 {
-        store.put([name; 32], &rows(2_000, name));
+    let store = Store::open(folder.path(), 4 << 20).unwrap();
+    for k in 0..400 {
+        store.put(name(k), &rows(9_999, 3));
     }
     store.close();
-    assert!(store.bytes() <= 10_000);
-    let kept: Vec<u8> = (0..20)
-        .filter(|&name| get(&store, name).is_some())
-        .collect();
-    assert_eq!(kept, [18, 19]);
+    let kept = |k: u32| store.get(&name(k), SHAPE).is_some();
+    let first = (0..400).find(|&k| kept(k)).unwrap();
+    assert!(
+        (1..400).contains(&first) && (first..400).all(kept),
+        "{first}"
+    );
 }
 
 #[test]
 fn a_result_larger_than_the_store_is_not_kept() {
     let folder = tempfile::tempdir().unwrap();
-    let store = Store::open(folder.path(), 1_000).unwrap();
-    store.put([1; 32], &rows(100, 1));
-    store.put([2; 32], &rows(5_000, 2));
+    let store = Store::open(folder.path(), 20_000).unwrap();
+    store.put([2; 32], &rows(9_999, 2));
     store.close();
-    assert_eq!(get(&store, 1), Some(rows(100, 1)));
     assert_eq!(get(&store, 2), None);
+    assert_eq!(store.warning(), None);
 }
 
 #[test]
