@@ -7,6 +7,7 @@ use std::sync::Arc;
 use rayon::ThreadPool;
 use thiserror::Error;
 
+use super::heap::Freed;
 use super::metrics::Metrics;
 use super::outcome::Outcome;
 use super::scenes::HeldScene;
@@ -23,6 +24,7 @@ pub(super) fn work<'a>(
     means: impl Fn() -> Means<'a> + Sync,
     metrics: &Metrics,
 ) {
+    let mut freed = Freed::default();
     while let Some(job) = solves.next() {
         let span = tracing::info_span!("solve", id = %job.id);
         let _entered = span.enter();
@@ -45,6 +47,7 @@ pub(super) fn work<'a>(
         }
         metrics.ended(&state);
         solves.ended(&job, state);
+        freed.give_back();
     }
 }
 

@@ -8,6 +8,7 @@ mod budget;
 mod compute;
 mod connection;
 mod error;
+mod heap;
 mod identity;
 mod intake;
 mod metrics;
