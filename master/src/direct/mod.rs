@@ -6,6 +6,7 @@
 //! Within an organ, light is dealt out by how much of each element is seen (visible points over all of
 //! its points), so a fully lit leaf is evenly lit however few points its elements have.
 
+mod areas;
 mod buffer;
 mod outlines;
 mod probe;
@@ -20,6 +21,7 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 use crate::world::World;
+use areas::Areas;
 use probe::Probe;
 
 /// Uncollided light on everything that has a row.
@@ -52,7 +54,8 @@ pub fn direct_light(
     line_area_m2: &[f64],
     seed: u64,
 ) -> Result<Direct, BlockFault> {
-    let probe = Probe::new(problem, world, line_area_m2, seed)?;
+    let areas = Areas::of(problem);
+    let probe = Probe::new(problem, world, &areas, line_area_m2, seed)?;
     let numbered: Vec<usize> = (0..problem.sources.len()).collect();
     let parts: Vec<Direct> = (0..GROUPS.min(numbered.len()))
         .into_par_iter()
@@ -70,6 +73,7 @@ pub fn direct_light(
                 source::add(
                     problem,
                     world,
+                    &areas,
                     &drawn,
                     probe.as_ref(),
                     &mut scratch,

@@ -9,6 +9,7 @@ use nestrad_worker::{Block, BlockFault, Tracer};
 use rand::RngExt;
 use rayon::prelude::*;
 
+use super::areas::Areas;
 use crate::exchange::{BlockOf, block_message};
 use crate::world::World;
 
@@ -39,23 +40,18 @@ pub(super) struct Thin {
 }
 
 impl Thin {
-    pub(super) fn of(problem: &Problem, towards: DVec3, line_area_m2: f64) -> Self {
-        let scene = &problem.scene;
-        let mut area_m2 = vec![0.0; scene.organs.len()];
-        let mut projected_m2 = vec![0.0; scene.organs.len()];
-        for (t, triangle) in scene.triangles.iter().enumerate() {
-            let (o, normal) = (
-                scene.organ[t] as usize,
-                geometry::doubled_area_vector(triangle),
-            );
-            area_m2[o] += 0.5 * normal.length();
-            projected_m2[o] += 0.5 * normal.dot(towards).abs();
-        }
+    pub(super) fn of(problem: &Problem, areas: &Areas, towards: DVec3, line_area_m2: f64) -> Self {
+        let projected_m2 = areas.projected_organs_m2(problem, towards);
         let is_thin = |(area, projected): (&f64, &f64)| {
             *projected > 0.0 && *area < THIN_POINTS * line_area_m2
         };
         Self {
-            organ: area_m2.iter().zip(&projected_m2).map(is_thin).collect(),
+            organ: areas
+                .organ_m2
+                .iter()
+                .zip(&projected_m2)
+                .map(is_thin)
+                .collect(),
             projected_m2,
         }
     }
@@ -77,11 +73,17 @@ impl Probe {
     pub(super) fn new(
         problem: &Problem,
         world: &World,
+        areas: &Areas,
         line_area_m2: &[f64],
         seed: u64,
     ) -> Result<Option<Self>, BlockFault> {
         let thin = |k: usize| {
-            let thin = Thin::of(problem, -problem.sources[k].direction, line_area_m2[k]);
+            let thin = Thin::of(
+                problem,
+                areas,
+                -problem.sources[k].direction,
+                line_area_m2[k],
+            );
             thin.organ.iter().filter(|&&thin| thin).count()
         };
         let organs: usize = (0..problem.sources.len()).into_par_iter().map(thin).sum();

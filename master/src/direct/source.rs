@@ -2,12 +2,12 @@
 
 use glam::DVec3;
 use nestrad_common::ends::Side;
-use nestrad_common::geometry;
 use nestrad_common::lattice::Lattice;
 use nestrad_common::optics::Band;
 use nestrad_common::problem::Problem;
 
 use super::Direct;
+use super::areas::Areas;
 use super::buffer::{Buffer, Top};
 use super::outlines::Outlines;
 use super::probe::{Probe, Thin};
@@ -87,6 +87,7 @@ pub(super) struct Drawn {
 pub(super) fn add(
     problem: &Problem,
     world: &World,
+    areas: &Areas,
     drawn: &Drawn,
     probe: Option<&Probe>,
     scratch: &mut Scratch,
@@ -109,7 +110,7 @@ pub(super) fn add(
         .collect();
     let mut missed = 0u64;
     scratch.clear();
-    let mut thin = Thin::of(problem, towards, line_area_m2);
+    let mut thin = Thin::of(problem, areas, towards, line_area_m2);
     if probe.is_none() {
         thin.forget();
     }
@@ -168,6 +169,7 @@ pub(super) fn add(
     let beam = Beam {
         problem,
         world,
+        areas,
         k,
         towards,
         line_area_m2: lattice.line_area_m2,
@@ -195,6 +197,7 @@ const LARGE: f64 = 4.0;
 struct Beam<'a> {
     problem: &'a Problem,
     world: &'a World,
+    areas: &'a Areas,
     /// Number of the source.
     k: usize,
     towards: DVec3,
@@ -209,12 +212,7 @@ impl Beam<'_> {
     }
 
     fn projected_m2(&self, element: usize) -> f64 {
-        projected_area_m2(
-            self.world,
-            &self.problem.scene.triangles,
-            element,
-            self.towards,
-        )
+        self.areas.projected_m2(self.world, element, self.towards)
     }
 
     /// Lights the organs that are too small for the lattice by rays; what points show of them is
@@ -343,8 +341,11 @@ impl Beam<'_> {
         // what no point meets gets nothing, which may be wrong by all of it
         for (e, &t) in world.triangle_of_element.iter().enumerate() {
             let o = self.organ_of(t);
+            if scratch.met[e] > 0 || thin.organ[o] {
+                continue;
+            }
             let projected_m2 = self.projected_m2(e);
-            if scratch.met[e] > 0 || thin.organ[o] || projected_m2 == 0.0 {
+            if projected_m2 == 0.0 {
                 continue;
             }
             let visible = (scratch.organ[o].seen_m2 / thin.projected_m2[o]).min(1.0);
@@ -373,18 +374,6 @@ impl Beam<'_> {
             }
         }
     }
-}
-
-/// Projected area of an element; negative when the lower face looks towards the source.
-fn projected_area_m2(
-    world: &World,
-    triangles: &[[DVec3; 3]],
-    element: usize,
-    towards: DVec3,
-) -> f64 {
-    let t = world.triangle_of_element[element] as usize;
-    let n = world.elements.divisions[t];
-    0.5 * geometry::doubled_area_vector(&triangles[t]).dot(towards) / f64::from(n * n)
 }
 
 pub(super) fn absorptance(band: &Band, material: usize, upper: bool) -> f64 {

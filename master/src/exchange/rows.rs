@@ -1,5 +1,7 @@
 //! Rows of the exchange, and how those of a batch's blocks are joined.
 
+use std::ops::Range;
+
 use nestrad_proto::v1;
 use rayon::prelude::*;
 
@@ -97,7 +99,19 @@ impl HalfRows {
     /// What a row sees.
     #[inline]
     pub fn row(&self, row: usize) -> &[u32] {
-        &self.ends[self.start[row] as usize..self.start[row + 1] as usize]
+        &self.ends[self.range(row)]
+    }
+
+    /// Where what a row sees stands among [`Self::ends`].
+    #[inline]
+    pub fn range(&self, row: usize) -> Range<usize> {
+        self.start[row] as usize..self.start[row + 1] as usize
+    }
+
+    /// What is seen, row after row.
+    #[inline]
+    pub fn ends(&self) -> &[u32] {
+        &self.ends
     }
 
     /// What a row sees in each batch, in order.

@@ -4,12 +4,16 @@ use rayon::prelude::*;
 
 use super::System;
 use super::lane::Lane;
+use super::prefetch::prefetch;
 use crate::exchange::{HalfRows, Outlook};
 use crate::far_field::closure::FarRows;
 use crate::world::World;
 
 /// Elements that are worked off as one task; a fixed number, so that sums have a fixed order.
 pub(super) const TASK: usize = 512;
+
+/// Entries that radiosities are asked for ahead of their use: some 100 ns, as long as the memory takes.
+const AHEAD: usize = 32;
 
 /// Least part of an irradiance that counts when changes are judged.
 const LEAST_COUNTED: f64 = 0.1;
@@ -149,7 +153,7 @@ impl<'a, const N: usize> Gather<'a, N> {
         let gathered = |row: usize| -> [f64; N] {
             let weight = self.outlook.weight[half][row];
             if weight > 0.0 {
-                let sum = gather(rows_of_half.row(row), &other.radiosity);
+                let sum = gather(rows_of_half, row, &other.radiosity);
                 let first = direct.map_or([0.0; N], |d| d[row].get());
                 std::array::from_fn(|k| first[k] + sum[k] * weight)
             } else {
@@ -212,11 +216,11 @@ impl<'a, const N: usize> Gather<'a, N> {
         let (near, far_ends) = radiosity.split_at_mut(self.world.ends.far_start() as usize);
         let rows = &far.halves[half];
         far_ends.par_iter_mut().enumerate().for_each(|(row, out)| {
-            let ends = rows.row(row);
+            let lines = rows.row(row).len();
             // a level that no line passes keeps what it has
-            if !ends.is_empty() {
-                let sum = gather(ends, near);
-                *out = L::of(sum.map(|s| s / ends.len() as f64));
+            if lines > 0 {
+                let sum = gather(rows, row, near);
+                *out = L::of(sum.map(|s| s / lines as f64));
             }
         });
     }
@@ -231,8 +235,9 @@ impl<'a, const N: usize> Gather<'a, N> {
             if way == 1 && self.world.soil.is_some() {
                 return [0.0; N];
             }
-            let ends = far.halves[half].row(self.world.ends.far_len() as usize + way);
-            gather(ends, radiosity).map(|s| s / ends.len().max(1) as f64)
+            let (rows, row) = (&far.halves[half], self.world.ends.far_len() as usize + way);
+            let lines = rows.row(row).len().max(1) as f64;
+            gather(rows, row, radiosity).map(|s| s / lines)
         })
     }
 
@@ -299,10 +304,14 @@ impl<'a, const N: usize> Gather<'a, N> {
 /// Sum of the radiosities of what a row sees: all lines weigh the same. What is buried is dark, and is
 /// not in the weight.
 #[inline]
-pub(super) fn gather<L: Lane<N>, const N: usize>(row: &[u32], seen: &[L]) -> [f64; N] {
+fn gather<L: Lane<N>, const N: usize>(rows: &HalfRows, row: usize, seen: &[L]) -> [f64; N] {
+    let ends = rows.ends();
     let mut sum = [0.0; N];
-    for &end in row {
-        let b = seen[end as usize].get();
+    for i in rows.range(row) {
+        if let Some(&end) = ends.get(i + AHEAD) {
+            prefetch(seen, end as usize);
+        }
+        let b = seen[ends[i] as usize].get();
         for k in 0..N {
             sum[k] += b[k];
         }

@@ -18,6 +18,7 @@ mod gather;
 mod krylov;
 mod lane;
 mod pass;
+mod prefetch;
 mod spread;
 
 use nestrad_common::problem::Problem;
