@@ -114,13 +114,13 @@ impl HalfRows {
         &self.ends
     }
 
-    /// What a row sees in each batch, in order.
-    pub fn by_batch(&self, row: usize) -> impl Iterator<Item = &[u32]> {
-        let entries = self.row(row);
+    /// Where what a row sees in each batch stands among [`Self::ends`], in order.
+    pub fn by_batch(&self, row: usize) -> impl Iterator<Item = Range<usize>> {
+        let start = self.start[row] as usize;
         let end = &self.batch_end[row * self.batches..(row + 1) * self.batches];
         (0..self.batches).map(move |g| {
             let first = if g == 0 { 0 } else { end[g - 1] };
-            &entries[first as usize..end[g] as usize]
+            start + first as usize..start + end[g] as usize
         })
     }
 

@@ -12,9 +12,6 @@ use crate::world::World;
 /// Elements that are worked off as one task; a fixed number, so that sums have a fixed order.
 pub(super) const TASK: usize = 512;
 
-/// Entries that radiosities are asked for ahead of their use: some 100 ns, as long as the memory takes.
-const AHEAD: usize = 32;
-
 /// Least part of an irradiance that counts when changes are judged.
 const LEAST_COUNTED: f64 = 0.1;
 
@@ -308,9 +305,7 @@ fn gather<L: Lane<N>, const N: usize>(rows: &HalfRows, row: usize, seen: &[L]) -
     let ends = rows.ends();
     let mut sum = [0.0; N];
     for i in rows.range(row) {
-        if let Some(&end) = ends.get(i + AHEAD) {
-            prefetch(seen, end as usize);
-        }
+        prefetch(seen, ends, i);
         let b = seen[ends[i] as usize].get();
         for k in 0..N {
             sum[k] += b[k];

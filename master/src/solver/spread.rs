@@ -16,7 +16,9 @@ use rayon::prelude::*;
 
 use super::gather::Gather;
 use super::lane::{Lane, PULLED_TOGETHER, PULLS, Pull};
+use super::prefetch::prefetch;
 use super::{HALF_BATCHES, System};
+use crate::exchange::HalfRows;
 use crate::world;
 
 /// A number for each batch.
@@ -92,8 +94,8 @@ impl Spread<'_> {
             .into_par_iter()
             .with_min_len(1024)
             .map(|row| {
-                let entries = rows.by_batch(row);
-                pull(entries, |end| end != buried, weights[row], seen, unit)
+                let counted = |end| end != buried;
+                pull(rows, row, counted, weights[row], (seen, unit))
             })
             .collect()
     }
@@ -106,7 +108,7 @@ impl Spread<'_> {
         let (rows, ends) = (&far.halves[half], self.system.world.ends.far_len() as usize);
         let of = |row: usize| {
             let weight = 1.0 / rows.row(row).len().max(1) as f64;
-            pull(rows.by_batch(row), |_| true, weight, near, unit)
+            pull(rows, row, |_| true, weight, (near, unit))
         };
         let pulls = (0..ends).into_par_iter().map(of).collect();
         let down = if self.system.world.soil.is_some() {
@@ -240,19 +242,22 @@ impl Spread<'_> {
     }
 }
 
-/// How batches pull a mean over `entries`, by batch, of which those that are not `counted` are dark and not in
-/// the mean; `weight` is one over the number of the others.
-fn pull<'a>(
-    entries: impl Iterator<Item = &'a [u32]>,
+/// How batches pull the mean over what a row sees, of which those ends that are not `counted` are dark and not
+/// in the mean; `weight` is one over the number of the others.
+fn pull(
+    rows: &HalfRows,
+    row: usize,
     counted: impl Fn(u32) -> bool,
     weight: f64,
-    seen: &[PerBand],
-    unit: PerBand,
+    (seen, unit): (&[PerBand], PerBand),
 ) -> Pull {
+    let ends = rows.ends();
     let mut sums = [[0.0; HALF_BATCHES]; PULLED_TOGETHER];
     let mut counts = [0usize; HALF_BATCHES];
-    for (g, entries) in entries.enumerate() {
-        for &end in entries {
+    for (g, range) in rows.by_batch(row).enumerate() {
+        for i in range {
+            prefetch(seen, ends, i);
+            let end = ends[i];
             for (sums, seen) in sums.iter_mut().zip(&seen[end as usize]) {
                 sums[g] += seen;
             }
