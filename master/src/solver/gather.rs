@@ -45,6 +45,15 @@ pub(super) struct Half<L> {
     pub(super) radiosity: Vec<L>,
 }
 
+impl<L> Default for Half<L> {
+    fn default() -> Self {
+        Self {
+            irradiance: Vec::new(),
+            radiosity: Vec::new(),
+        }
+    }
+}
+
 impl<'a, const N: usize> Gather<'a, N> {
     /// Prepares the bands with these numbers (at most `N`; the rest are black).
     pub(super) fn new(system: &System<'a>, bands: &[usize]) -> Self {
@@ -86,18 +95,13 @@ impl<'a, const N: usize> Gather<'a, N> {
         }
     }
 
-    /// A half with the given irradiances, and what they make the rows send out; `fixed`: radiosities of the
-    /// ends that are not rows, from the sky on.
-    pub(super) fn start<L: Lane<N>>(&self, irradiance: Vec<L>, fixed: &[L]) -> Half<L> {
-        let dark = L::of([0.0; N]);
-        let mut radiosity = vec![dark; self.world.rows()];
-        radiosity.extend_from_slice(fixed);
-        let mut half = Half {
-            irradiance,
-            radiosity,
-        };
-        self.scatter(&mut half);
-        half
+    /// Begins with the irradiances of a half: sets what they make the rows send out, and the ends that are not
+    /// rows, from the sky on, to `fixed`.
+    pub(super) fn start<L: Lane<N>>(&self, half: &mut Half<L>, fixed: &[L]) {
+        half.radiosity.clear();
+        half.radiosity.resize(self.world.rows(), L::of([0.0; N]));
+        half.radiosity.extend_from_slice(fixed);
+        self.scatter(half);
     }
 
     /// Sets what the rows send out, as follows from their irradiances.

@@ -31,8 +31,8 @@ use gather::Gather;
 use krylov::{Descent, difference};
 use lane::PULLED_TOGETHER;
 use pass::Pass;
-use spread::Spread;
 pub use spread::Variances;
+use spread::{Spread, Way};
 
 /// Batches in a half of the exchange.
 pub const HALF_BATCHES: usize = 8;
@@ -173,6 +173,7 @@ impl Group<'_> {
         }
         all.passes = all.passes.max(pass.done);
         self.take(&pass, first, all);
+        let mut way = Way::default();
         for pair in (0..self.bands.len()).step_by(PULLED_TOGETHER) {
             let bands = &self.bands[pair..(pair + PULLED_TOGETHER).min(self.bands.len())];
             let variances = &mut all.variances[first + pair..first + pair + bands.len()];
@@ -187,7 +188,7 @@ impl Group<'_> {
                 half.radiosity.iter().map(of).collect()
             });
             for half in 0..2 {
-                spread.add(half, &radiosity, variances);
+                spread.add(half, &radiosity, &mut way, variances);
             }
         }
         Ok(())

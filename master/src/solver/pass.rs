@@ -32,7 +32,11 @@ impl<'a, const N: usize> Pass<'a, N> {
             *lane = lane.map(|e| if exposed > 0.0 { e / exposed } else { 0.0 });
         }
         let fixed = lanes(system.fixed_W_m2);
-        let start = gather.start(direct.clone(), &fixed);
+        let mut start = Half {
+            irradiance: direct.clone(),
+            radiosity: Vec::new(),
+        };
+        gather.start(&mut start, &fixed);
         Self {
             gather,
             system: *system,

@@ -14,7 +14,7 @@
 
 use rayon::prelude::*;
 
-use super::gather::Gather;
+use super::gather::{Gather, Half};
 use super::lane::{Lane, PULLED_TOGETHER, PULLS, Pull};
 use super::prefetch::prefetch;
 use super::{HALF_BATCHES, System};
@@ -45,18 +45,22 @@ pub(super) struct Spread<'a> {
     pub(super) bands: &'a [usize],
 }
 
-/// How batches pull the irradiances of rows, the radiosities of far ends, and what leaves upwards and
-/// downwards through the far field.
-struct Pulls {
-    rows: Vec<Pull>,
-    far: Vec<Pull>,
+/// How batches pull the radiosities of far ends, and what leaves upwards and downwards through the far field.
+struct FarPulls {
+    ends: Vec<Pull>,
     leaving: [Pull; 2],
 }
 
-/// What a pull does to irradiances, and to what leaves through the far field.
-struct Change {
-    irradiance: Vec<Pull>,
-    leaving: [Pull; 2],
+/// Pulls on their way. Kept from half to half: of a large scene it is hundreds of MB, which the system has to
+/// clear each time that they are new.
+#[derive(Default)]
+pub(super) struct Way {
+    /// How batches pull the irradiances of rows.
+    rows: Vec<Pull>,
+    /// What they do to the half that they pull on.
+    pulled: Half<Pull>,
+    /// And to the other.
+    other: Half<Pull>,
 }
 
 /// What of a pull is still on its way when it is no longer followed, in parts of the pull.
@@ -71,22 +75,24 @@ type PerBand = [f64; PULLED_TOGETHER];
 impl Spread<'_> {
     /// Adds the variances that the batches of a half leave to `sums`, one per band. `radiosity` of all ends
     /// in both halves, in these bands: a half's rows look at those of the other, its far field at its own.
-    pub(super) fn add(&self, half: usize, radiosity: &[Vec<PerBand>; 2], sums: &mut [Variances]) {
+    pub(super) fn add(
+        &self,
+        half: usize,
+        radiosity: &[Vec<PerBand>; 2],
+        way: &mut Way,
+        sums: &mut [Variances],
+    ) {
         let unit = units(&radiosity[1 - half]);
-        let (far, leaving) = self.far_pulls(half, &radiosity[half], unit);
-        let pulls = Pulls {
-            rows: self.pulls(half, &radiosity[1 - half], unit),
-            far,
-            leaving,
-        };
-        let change = self.followed(half, &pulls);
+        let far = self.far_pulls(half, &radiosity[half], unit);
+        self.pulls(half, &radiosity[1 - half], unit, &mut way.rows);
+        let leaving = self.follow(half, &far, way);
         for (k, sum) in sums.iter_mut().enumerate() {
-            self.collect(&change, (k, unit[k]), sum);
+            self.collect(&way.pulled.irradiance, &leaving, (k, unit[k]), sum);
         }
     }
 
     /// How each batch of a half pulls the irradiance of each row, in units of `unit`.
-    fn pulls(&self, half: usize, seen: &[PerBand], unit: PerBand) -> Vec<Pull> {
+    fn pulls(&self, half: usize, seen: &[PerBand], unit: PerBand, into: &mut Vec<Pull>) {
         let buried = self.system.world.ends.buried();
         let rows = &self.system.exchange.halves[half];
         let weights = &self.system.outlook.weight[half];
@@ -97,30 +103,41 @@ impl Spread<'_> {
                 let counted = |end| end != buried;
                 pull(rows, row, counted, weights[row], (seen, unit))
             })
-            .collect()
+            .collect_into_vec(into);
     }
 
     /// How each batch of a half of the far field pulls the radiosities of the far ends, and what leaves.
-    fn far_pulls(&self, half: usize, near: &[PerBand], unit: PerBand) -> (Vec<Pull>, [Pull; 2]) {
+    fn far_pulls(&self, half: usize, near: &[PerBand], unit: PerBand) -> FarPulls {
         let Some(far) = self.system.far else {
-            return (Vec::new(), [Pull::NONE; 2]);
+            return FarPulls {
+                ends: Vec::new(),
+                leaving: [Pull::NONE; 2],
+            };
         };
         let (rows, ends) = (&far.halves[half], self.system.world.ends.far_len() as usize);
         let of = |row: usize| {
             let weight = 1.0 / rows.row(row).len().max(1) as f64;
             pull(rows, row, |_| true, weight, (near, unit))
         };
-        let pulls = (0..ends).into_par_iter().map(of).collect();
         let down = if self.system.world.soil.is_some() {
             Pull::NONE
         } else {
             of(ends + 1)
         };
-        (pulls, [of(ends), down])
+        FarPulls {
+            ends: (0..ends).into_par_iter().map(of).collect(),
+            leaving: [of(ends), down],
+        }
     }
 
-    /// The change of the result, the mean of both halves, that pulls on one half bring about.
-    fn followed(&self, half: usize, pulls: &Pulls) -> Change {
+    /// Makes of pulls on one half the change that they bring about of the result, the mean of both halves, in
+    /// place of the irradiances of the half; returns that of what leaves through the far field.
+    fn follow(&self, half: usize, far_pulls: &FarPulls, way: &mut Way) -> [Pull; 2] {
+        let Way {
+            rows,
+            pulled,
+            other,
+        } = way;
         let world = self.system.world;
         let lanes: Vec<usize> = self
             .bands
@@ -130,23 +147,25 @@ impl Spread<'_> {
         let gather = Gather::<PULLS>::new(&self.system, &lanes);
         let halves = &self.system.exchange.halves;
         let dark = vec![Pull::NONE; world.ends.len() - world.rows()];
-        let first = gather.absorbed(&pulls.rows);
+        let first = gather.absorbed(rows);
         let pull_far = |radiosity: &mut [Pull]| {
             let far = &mut radiosity[world.ends.far_start() as usize..];
-            for (radiosity, pull) in far.iter_mut().zip(&pulls.far) {
+            for (radiosity, pull) in far.iter_mut().zip(&far_pulls.ends) {
                 *radiosity = sum(radiosity, pull);
             }
         };
-        let mut pulled = gather.start(pulls.rows.clone(), &dark);
+        pulled.irradiance.clone_from(rows);
+        gather.start(pulled, &dark);
         gather.close_far_field(half, &mut pulled.radiosity);
         pull_far(&mut pulled.radiosity);
-        let mut other = gather.start(vec![Pull::NONE; world.rows()], &dark);
+        other.irradiance.clear();
+        other.irradiance.resize(world.rows(), Pull::NONE);
+        gather.start(other, &dark);
         for step in 0..MOST_STEPS {
             let change = if step % 2 == 0 {
-                gather.sweep(1 - half, &halves[1 - half], &pulled, None, &mut other)
+                gather.sweep(1 - half, &halves[1 - half], pulled, None, other)
             } else {
-                let lit = Some(&pulls.rows[..]);
-                let change = gather.sweep(half, &halves[half], &other, lit, &mut pulled);
+                let change = gather.sweep(half, &halves[half], other, Some(rows), pulled);
                 pull_far(&mut pulled.radiosity);
                 change
             };
@@ -161,27 +180,29 @@ impl Spread<'_> {
             gather.leaving(half, &pulled.radiosity),
             gather.leaving(1 - half, &other.radiosity),
         ];
-        let leaving = [0, 1].map(|way: usize| {
-            let through = mean(leaving[0][way], leaving[1][way]);
-            // what pulls one half's mean pulls half as much on that of both
-            let own = pulls.leaving[way].get().map(|p| 0.5 * p);
-            sum(&through, &Pull::of(own))
-        });
-        let mut irradiance = pulled.irradiance;
-        irradiance
+        pulled
+            .irradiance
             .par_iter_mut()
             .zip(&other.irradiance)
             .for_each(|(a, b)| *a = mean(a.get(), b.get()));
-        Change {
-            irradiance,
-            leaving,
-        }
+        [0, 1].map(|way: usize| {
+            let through = mean(leaving[0][way], leaving[1][way]);
+            // what pulls one half's mean pulls half as much on that of both
+            let own = far_pulls.leaving[way].get().map(|p| 0.5 * p);
+            sum(&through, &Pull::of(own))
+        })
     }
 
     /// Adds the variances in band `k` of the group, whose changes are in units of `unit`.
-    fn collect(&self, of: &Change, (k, unit): (usize, f64), sum: &mut Variances) {
+    fn collect(
+        &self,
+        irradiance: &[Pull],
+        leaving: &[Pull; 2],
+        (k, unit): (usize, f64),
+        sum: &mut Variances,
+    ) {
         let pull = |of: &Pull| of.of_band(k).map(|x| x * unit);
-        let at = |row: usize| pull(&of.irradiance[row]);
+        let at = |row: usize| pull(&irradiance[row]);
         let (scene, elements) = (&self.system.problem.scene, self.system.world.elements.len());
         let band = &self.system.problem.bands[self.bands[k]];
         let soil_triangle = world::is_soil(scene);
@@ -206,7 +227,7 @@ impl Spread<'_> {
             add(&mut balance[usize::from(soil_triangle[t])], 1.0, &absorbed);
             sum.triangle_W2[t] += variance(&absorbed);
         }
-        for row in 2 * elements..of.irradiance.len() {
+        for row in 2 * elements..irradiance.len() {
             let (cell, pull) = (row - 2 * elements, at(row));
             let area = self.exposed_area_m2(row);
             add(&mut balance[1], (1.0 - band.soil_albedo) * area, &pull);
@@ -215,7 +236,7 @@ impl Spread<'_> {
         }
         if self.system.far.is_some() {
             let ground_m2 = self.system.world.ground_area_m2();
-            for (balance, leaving) in balance[2..].iter_mut().zip(&of.leaving) {
+            for (balance, leaving) in balance[2..].iter_mut().zip(leaving) {
                 *balance = pull(leaving).map(|x| ground_m2 * x);
             }
         }
