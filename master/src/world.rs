@@ -146,12 +146,25 @@ impl World {
     }
 }
 
-/// Where the lines of a scene run.
-pub fn extent_of(scene: &Scene) -> Extent {
+/// The corners of a scene's box, soil included.
+pub fn bounds_of(scene: &Scene) -> (DVec3, DVec3) {
     let (mut min, mut max) =
         geometry::bounds(scene.triangles.iter().flatten()).unwrap_or((DVec3::ZERO, DVec3::ZERO));
     if let Some(z) = scene.soil_z_m {
         (min.z, max.z) = (min.z.min(z), max.z.max(z));
+    }
+    (min, max)
+}
+
+/// How far below the soil lines run on, in parts of the height above it: far enough to tell what is buried
+/// from the soil.
+const BELOW_SOIL: f64 = 1e-3;
+
+/// Where the lines of a scene run.
+pub fn extent_of(scene: &Scene) -> Extent {
+    let (mut min, mut max) = bounds_of(scene);
+    if let Some(z) = scene.soil_z_m.filter(|&z| z < max.z) {
+        min.z = min.z.max(z - BELOW_SOIL * (max.z - z));
     }
     match scene.pattern {
         Some(p) => {

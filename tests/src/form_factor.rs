@@ -59,7 +59,8 @@ impl Traced {
         for &row in rows {
             let counts: Vec<(f64, f64)> = halves
                 .iter()
-                .flat_map(|&half| self.exchange.halves[half].by_batch(row))
+                .map(|&half| &self.exchange.halves[half])
+                .flat_map(|half| half.by_batch(row).map(|batch| &half.ends()[batch]))
                 .map(|ends| {
                     let seen = ends.iter().filter(|&&end| hits(end)).count();
                     (seen as f64, ends.len() as f64)

@@ -5,7 +5,7 @@ use nestrad_common::problem::Problem;
 use rayon::prelude::*;
 use serde::Serialize;
 
-use crate::world::{extent_of, is_soil};
+use crate::world::{bounds_of, extent_of, is_soil};
 
 /// Lengths and areas that stand for a scene.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -44,8 +44,8 @@ impl Scale {
         }
         organs.sort_unstable_by(f64::total_cmp);
         let extent = extent_of(scene);
-        let size = extent.max_m - extent.min_m;
-        let [x, y, z] = size.to_array();
+        let [x, y, z] = (extent.max_m - extent.min_m).to_array();
+        let (lowest, highest) = bounds_of(scene);
         let mean = |squares: f64| if area > 0.0 { squares / area } else { 0.0 };
         Self {
             area_m2: area,
@@ -54,7 +54,7 @@ impl Scale {
                 // a quarter of the surface (Cauchy 1832)
                 None => (x * y).max(0.5 * (x * y + x * z + y * z)),
             },
-            height_m: size.z,
+            height_m: highest.z - lowest.z,
             organ_area_m2: mean(organs.iter().map(|a| a * a).sum()),
             triangle_area_m2: mean(triangle_squares),
         }
