@@ -46,6 +46,13 @@ fn a_sun_on_the_horizon_of_open_soil_with_buried_leaves_balances() {
     holds(2_000_645);
 }
 
+/// Leaves that stick out of the soil by 0.6 mm, less than the lattice of the exchange: all its lines met what is
+/// buried, and the light on what sticks out, four fifths of all, went nowhere.
+#[test]
+fn leaves_that_peep_out_of_the_soil_keep_their_light() {
+    holds(541);
+}
+
 #[test]
 fn wild_scenes_are_solved_soundly_or_refused() {
     (0..40).for_each(holds);
