@@ -88,6 +88,10 @@ fn snap(x: f64) -> f64 {
 /// Largest number of steps along one side; keeps every coordinate exact in f64.
 const MAX_SIDE: f64 = (1u64 << 24) as f64;
 
+/// An open lattice has at least this many points along each side, if it has so many: between the two rows of a
+/// long and narrow one, what lies along it would be met by no line at all.
+const FEWEST_ALONG: f64 = 16.0;
+
 impl Lattice {
     /// A lattice of lines whose cross-section is close to `line_area_m2` (m², > 0).
     ///
@@ -115,8 +119,12 @@ impl Lattice {
         } else {
             0.5
         };
-        let wanted_y = (size.y / (side * d.z.powf(along_x - 1.0))).clamp(1.0, MAX_SIDE);
-        let [nx, ny] = sides(size.x * size.y * d.z / line_area_m2, wanted_y, random[2]);
+        let lines = size.x * size.y * d.z / line_area_m2;
+        let mut wanted_y = (size.y / (side * d.z.powf(along_x - 1.0))).clamp(1.0, MAX_SIDE);
+        if !extent.periodic && lines >= FEWEST_ALONG * FEWEST_ALONG {
+            wanted_y = wanted_y.clamp(FEWEST_ALONG, lines / FEWEST_ALONG);
+        }
+        let [nx, ny] = sides(lines, wanted_y, random[2]);
         let steps_per_m = DVec2::new(nx.max(1.0), ny) / size;
         // an open lattice that is not aligned with its box has one more point along a side
         let points = |n: f64| n as u32 + u32::from(!extent.periodic && n > 0.0);

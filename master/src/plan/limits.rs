@@ -10,9 +10,11 @@ use super::{PlanError, Scale, Settings};
 /// The accuracy below which the number of directions would pass a million, percent.
 const LEAST_ACCURACY_PERCENT: f64 = 0.01;
 
-/// Most copies of the pattern that one triangle may reach into, or a slope of 45 degrees through the scene:
-/// rays go from copy to copy.
+/// Most copies of the pattern that one triangle may reach into.
 const MOST_PATTERNS: f64 = 1e3;
+
+/// Times that a scene may be as high as its pattern is wide: rays cross as many copies of it.
+const MOST_WIDTHS: f64 = 100.0;
 
 /// A step in height may be this part of a triangle.
 const FINEST_STEP: f64 = 1e-3;
@@ -55,13 +57,13 @@ pub(super) fn check_pattern(problem: &Problem, scale: &Scale) -> Result<(), Plan
         return Ok(());
     };
     let (height_m, width_m) = (scale.height_m, pattern.size_m.min_element());
-    if height_m <= MOST_PATTERNS * width_m {
+    if height_m <= MOST_WIDTHS * width_m {
         return Ok(());
     }
     Err(PlanError::Narrow {
         height_m,
         width_m,
-        most: MOST_PATTERNS,
+        most: MOST_WIDTHS,
     })
 }
 

@@ -127,7 +127,7 @@ pub enum PlanError {
     },
     /// A pattern that light crosses too often on its way.
     #[error(
-        "the scene, soil included, is {height_m:.1e} m high on a pattern {width_m:.1e} m wide, expected at most {most:.0e} times as high as wide: are the unit and the height of the soil right?"
+        "the scene, soil included, is {height_m:.1e} m high on a pattern {width_m:.1e} m wide, expected at most {most} times as high as wide: are the unit and the height of the soil right?"
     )]
     Narrow {
         /// From the lowest to the highest point.
