@@ -15,7 +15,9 @@ pub fn page(rows: &[Row]) -> String {
          also checked for what must hold of any: no number that is not finite, nothing below zero, nothing \
          absorbed that did not come in, a balance that closes within its stated error. Expectations come \
          from closed forms, limits, conservation, or the neighbouring case that is not extreme. ± is one \
-         standard error as the program states it.\n",
+         standard error as the program states it.\n\n\
+         What no list would have thought of comes from random scenes, `fuzz_scenes SECONDS [FIRST SEED]`: \
+         what that found is in `tests/tests/wild_scenes.rs`, by seed.\n",
         rows.len()
     );
     let mut axis = "";
