@@ -28,11 +28,11 @@ function table(heading, rows) {
   return `<div class="wide"><table>${line(heading, 'th')}${rows.map((row) => line(row, 'td')).join('')}</table></div>`;
 }
 
-// The next of 1, 2, 5, 10, ... and a step that divides it.
+// The next round number.
 function roundTop(value) {
   if (!(value > 0)) return 1;
   const power = 10 ** Math.floor(Math.log10(value));
-  return [1, 1.5, 2, 3, 4, 5, 6, 8, 10].map((k) => k * power).find((top) => top >= value * 0.999999);
+  return [1, 1.5, 2, 2.5, 3, 4, 5, 6, 8, 10].map((k) => k * power).find((top) => top >= value * 0.999999);
 }
 
 // Bars along the height, under a title in HTML. layers: {low_m, high_m}; parts: lists of values with a class

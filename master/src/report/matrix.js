@@ -24,7 +24,7 @@ class Camera {
     this.target = [...this.centre];
     this.angle = from === 'top' ? -Math.PI / 2 : -0.9;
     this.tilt = { home: 0.45, front: 0, top: Math.PI / 2 }[from];
-    this.distance = this.radius * 2.9;
+    this.distance = this.radius * 2.6;
   }
 
   turn(dx, dy) {

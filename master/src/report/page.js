@@ -25,12 +25,14 @@ function shownValues() {
 
 function recolour() {
   const top = report.scale_W_m2[state.band];
-  element('scale').innerHTML = `<span>0</span><span class="ramp" style="background:linear-gradient(to right,${COLOURS.join(',')})"></span>` +
-    `<span>${figure(top, 3)} W m⁻² of leaf area absorbed in ${html(report.bands[state.band])}</span>`;
-  if (!state.view) return;
-  const scale = top > 0 ? 1 / top : 0;
   const soil = report.soil ? report.soil.irradiance_W_m2[state.band] : [];
   const most = soil.reduce((a, b) => Math.max(a, b), 0);
+  const ticks = [0, 0.25, 0.5, 0.75, 1].map((part) => `<span>${part === 1 ? '≥ ' : ''}${figure(top * part, 3)}</span>`);
+  element('scale').innerHTML = `<div class="ramp"><div style="background:linear-gradient(to right,${COLOURS.join(',')})"></div>` +
+    `<p>${ticks.join('')}</p></div><p>W absorbed per m² of leaf in ${html(report.bands[state.band])}` +
+    `${most > 0 ? `<br><span class="se">soil, dark to light: 0 to ${figure(most, 3)} W m⁻² arriving</span>` : ''}</p>`;
+  if (!state.view) return;
+  const scale = top > 0 ? 1 / top : 0;
   state.view.show(shownValues().map((value) => value * scale), soil.map((value) => (most > 0 ? value / most : 0)));
 }
 
@@ -105,7 +107,9 @@ function showBalance() {
   const divisor = report.periodic ? report.ground_area_m2 : 1;
   const part = (value, of) => (of > 0 ? ` <span class="se">(${(100 * value / of).toFixed(2)} %)</span>` : '');
   const rows = [['incoming', ...report.balance.map((b) => figure(b.incoming_W / divisor, 5))]];
-  for (const [title, key] of flows) {
+  // what is nothing in all bands is not worth a line; closure always is
+  const matters = (key) => key === 'closure_W' || report.balance.some((b) => Math.abs(b[key].value) > 1e-6 * b.incoming_W);
+  for (const [title, key] of flows.filter((flow) => matters(flow[1]))) {
     rows.push([title, ...report.balance.map((b) => withError(b[key].value / divisor, b[key].se / divisor) + part(b[key].value, b.incoming_W))]);
   }
   element('balance').innerHTML = table([report.periodic ? 'W per m² of ground' : 'W, whole scene', ...report.balance.map((b) => html(b.band))], rows) +
