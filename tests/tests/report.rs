@@ -84,6 +84,13 @@ fn the_page_has_the_numbers_of_the_tables() {
     for outside in ["http://", "https://", "src="] {
         assert!(!page.contains(outside), "{outside}");
     }
+
+    let (said, good) = report(folder.path(), &["--png", "pic.png", "--png-band", "UV"]);
+    assert!(!good && said.contains("PAR, NIR"), "{said}");
+    let (said, good) = report(folder.path(), &["--png", "pic.png", "--png-band", "NIR"]);
+    assert!(good, "{said}");
+    let picture = fs::read(folder.path().join("pic.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 20_000);
     // nothing is left beside it
     let left = fs::read_dir(folder.path().join("out")).unwrap();
     let hidden = left.filter(|f| {

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use nestrad_common::assemble;
 use nestrad_common::inputs::Inputs;
-use nestrad_master::report::{self, Request};
+use nestrad_master::report::{self, PictureRequest, Request};
 
 use super::console::Notes;
 
@@ -30,6 +30,14 @@ pub(crate) struct ReportArgs {
     #[arg(long, value_name = "N", default_value_t = 2_000_000)]
     most_triangles: usize,
 
+    /// Write a picture of the canopy too, as PNG, for print
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
+
+    /// The band that colours the picture [default: the first]
+    #[arg(long, value_name = "NAME", requires = "png")]
+    png_band: Option<String>,
+
     /// Nothing on the terminal but errors
     #[arg(long)]
     quiet: bool,
@@ -52,6 +60,10 @@ impl ReportArgs {
             out: &self.out,
             scene,
             most_triangles: self.most_triangles,
+            picture: self.png.as_deref().map(|path| PictureRequest {
+                path,
+                band: self.png_band.as_deref(),
+            }),
         })?;
         if let Some(missing) = &written.not_drawn {
             notes.say("warning", missing);

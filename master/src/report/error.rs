@@ -72,7 +72,17 @@ pub enum ReportError {
         /// The first difference.
         what: String,
     },
-    /// The page cannot be written.
+    /// A picture was asked for in a band that there is not.
+    #[error("{}: expected a band of {bands}, found {found}", out.display())]
+    Band {
+        /// Folder of results.
+        out: PathBuf,
+        /// All that there are.
+        bands: String,
+        /// What was asked for.
+        found: String,
+    },
+    /// The page or the picture cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
 }

@@ -3,7 +3,9 @@
 
 mod data;
 mod error;
+mod letters;
 mod page;
+mod picture;
 pub mod profile;
 mod table;
 
@@ -39,6 +41,17 @@ pub struct Request<'a> {
     pub scene: Option<Inputs>,
     /// A canopy of more triangles is not drawn.
     pub most_triangles: usize,
+    /// A picture of the canopy, if it is wanted.
+    pub picture: Option<PictureRequest<'a>>,
+}
+
+/// A picture beside the page.
+#[derive(Clone, Debug)]
+pub struct PictureRequest<'a> {
+    /// Where it is written, as PNG.
+    pub path: &'a Path,
+    /// The band that colours it; `None` for the first.
+    pub band: Option<&'a str>,
 }
 
 /// A report that was written.
@@ -87,6 +100,10 @@ struct Facts<'a> {
 pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
     let results = data::read(request.out)?;
     let scene = scene(request, &results)?;
+    let picture = request.picture.as_ref();
+    let picture = picture
+        .map(|picture| Ok::<_, ReportError>((picture.path, band(request.out, &results, picture)?)))
+        .transpose()?;
     let path = request.out.join(REPORT);
     let most = request.most_triangles;
     let triangles = scene.triangles.len();
@@ -101,13 +118,16 @@ pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
     let ground_m2 = summary.plan.scale.ground_area_m2;
     let balance = &summary.energy_balance;
     let above: Vec<f64> = balance.iter().map(|b| b.incoming_W / ground_m2).collect();
-    let scale_W_m2 = (0..results.bands.len())
+    let scale_W_m2: Vec<f64> = (0..results.bands.len())
         .map(|band| {
             let values = patches.iter();
             let values = values.map(|p| (p.light[band].absorbed_W_m2, p.area_m2));
             profile::scale_top(values, OFF_SCALE)
         })
         .collect();
+    if let Some((path, band)) = picture {
+        write_picture(path, &scene, &results, band, scale_W_m2[band])?;
+    }
     let title = title(&summary.options.scenes);
     let facts = Facts {
         title: &title,
@@ -148,6 +168,42 @@ pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
         path,
         not_drawn,
     })
+}
+
+/// The number of the band that colours a picture.
+fn band(out: &Path, results: &Results, picture: &PictureRequest<'_>) -> Result<usize, ReportError> {
+    let Some(name) = picture.band else {
+        return Ok(0);
+    };
+    let found = results.bands.iter().position(|band| band == name);
+    found.ok_or_else(|| ReportError::Band {
+        out: out.to_owned(),
+        bands: results.bands.join(", "),
+        found: name.to_owned(),
+    })
+}
+
+fn write_picture(
+    path: &Path,
+    scene: &Scene,
+    results: &Results,
+    band: usize,
+    top: f64,
+) -> Result<(), ReportError> {
+    let bands = results.bands.len();
+    let value = |t: usize| {
+        let absorbed = results.triangles.light[t * bands + band].absorbed_W_m2;
+        if top > 0.0 { absorbed / top } else { 0.0 }
+    };
+    let picture = picture::draw(&scene.triangles, value, top, &results.bands[band]);
+    let folder = match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let mut staging = Staging::begin(folder)?;
+    staging.write(&name, |out| picture.write_png(out))?;
+    Ok(staging.commit(&name, &[])?)
 }
 
 /// The canopy, which must be the one that was solved.
