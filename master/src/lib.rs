@@ -14,6 +14,7 @@ pub mod order;
 pub mod output;
 pub mod plan;
 pub mod remote;
+pub mod report;
 pub mod results;
 pub mod run;
 pub mod service;

@@ -18,6 +18,7 @@ fn main() -> ExitCode {
         Command::Solve(args) => args.run(),
         Command::Check(args) => args.run(),
         Command::Generate(args) => args.run(),
+        Command::Report(args) => args.run(),
         Command::Serve(args) => args.run(),
         Command::Status(args) => args.run(),
     };

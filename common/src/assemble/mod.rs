@@ -16,6 +16,7 @@ use crate::inputs::{Inputs, LightInput, PatternInput};
 use crate::inspection::{Inspection, inspect};
 use crate::light::SkyLight;
 use crate::problem::Problem;
+use crate::scene::Scene;
 
 pub use bands::{BandOptics, resolve_band};
 pub use error::LoadError;
@@ -110,6 +111,11 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
 pub fn inspect_geometry(inputs: &Inputs) -> Result<Inspection, LoadError> {
     let (scene, origins) = build_scene(read_geometry(inputs)?)?;
     Ok(inspect(&scene, &origins))
+}
+
+/// Reads the triangles alone, in metres: where they lie is all that a drawing of results needs.
+pub fn load_scene(inputs: &Inputs) -> Result<Scene, LoadError> {
+    Ok(build_scene(read_geometry(inputs)?)?.0)
 }
 
 fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {

@@ -6,6 +6,7 @@ mod flags;
 mod generate;
 mod record;
 mod remote;
+mod report;
 mod serve;
 mod solve;
 mod state;
@@ -33,6 +34,7 @@ pub(crate) enum Command {
     Solve(Box<solve::SolveArgs>),
     Check(check::CheckArgs),
     Generate(generate::GenerateArgs),
+    Report(report::ReportArgs),
     Serve(serve::ServeArgs),
     Status(status::StatusArgs),
 }

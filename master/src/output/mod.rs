@@ -54,10 +54,12 @@ pub struct Formats {
 
 const SUMMARY: &str = "summary.json";
 const SURFACE: &str = "canopy.vtp";
+/// The page that is made of a result.
+pub(crate) const REPORT: &str = "report.html";
 
 /// All that a run may write: what is not part of a result is removed from an earlier one's folder,
 /// so that a folder never shows two results at once.
-const ALL_FILES: [&str; 8] = [
+const ALL_FILES: [&str; 9] = [
     "organs.csv",
     "organs.parquet",
     "triangles.csv",
@@ -65,6 +67,8 @@ const ALL_FILES: [&str; 8] = [
     "soil.csv",
     "soil.parquet",
     SURFACE,
+    // made of a result by `nestrad report`: it does not outlive it
+    REPORT,
     SUMMARY,
 ];
 

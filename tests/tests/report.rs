@@ -1,0 +1,232 @@
+//! `nestrad report`: the page holds the numbers of the tables, and a browser shows them.
+
+#![allow(clippy::unwrap_used, reason = "what cannot be set up fails the test")]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+
+use nestrad_tests::processes::{finish, nestrad, said, wait_for};
+use serde_json::Value;
+use tempfile::TempDir;
+
+/// A small bean canopy, solved. The folder has `scene.toml` and `out`.
+fn solved(format: &str) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    for args in [
+        "generate bean --rows 1x2 --leaf-triangle 1e-4 --out .".to_owned(),
+        format!("solve scene.toml --out out --accuracy 5 --quiet --format {format}"),
+    ] {
+        let args: Vec<&str> = args.split(' ').collect();
+        let output = finish(nestrad(folder.path(), &args));
+        assert!(output.status.success(), "{}", said(&output));
+    }
+    folder
+}
+
+/// Runs `nestrad report` and returns what it said, and whether it succeeded.
+fn report(folder: &Path, args: &[&str]) -> (String, bool) {
+    let args = [&["report", "out"], args].concat();
+    let output = finish(nestrad(folder, &args));
+    (said(&output), output.status.success())
+}
+
+fn page(folder: &Path) -> String {
+    fs::read_to_string(folder.join("out/report.html")).unwrap()
+}
+
+/// The text of an element that is known by its id.
+fn element<'a>(page: &'a str, id: &str) -> &'a str {
+    let (_, after) = page.split_once(&format!("id=\"{id}\"")).unwrap();
+    let (_, text) = after.split_once('>').unwrap();
+    text.split_once("</").unwrap().0
+}
+
+fn facts(page: &str) -> Value {
+    serde_json::from_str(element(page, "report")).unwrap()
+}
+
+/// The last organ of the table, and its absorbed power in each band.
+fn last_organ(folder: &Path) -> (String, Vec<f64>) {
+    let table = fs::read_to_string(folder.join("out/organs.csv")).unwrap();
+    let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split(',').collect()).collect();
+    let last = rows.last().unwrap()[1];
+    let own = rows.iter().filter(|row| row[1] == last);
+    (
+        last.to_owned(),
+        own.map(|row| row[6].parse().unwrap()).collect(),
+    )
+}
+
+#[test]
+fn the_page_has_the_numbers_of_the_tables() {
+    let folder = solved("csv");
+    let (said, good) = report(folder.path(), &[]);
+    assert!(good && said.contains("report.html"), "{said}");
+    let page = page(folder.path());
+    let facts = facts(&page);
+
+    let (name, absorbed) = last_organ(folder.path());
+    let organ = facts["organs"].as_array().unwrap().last().unwrap();
+    assert_eq!(organ["organ"], name);
+    for (band, expected) in absorbed.iter().enumerate() {
+        assert_eq!(organ["light"][band]["absorbed_W"], *expected);
+    }
+
+    for (band, balance) in facts["balance"].as_array().unwrap().iter().enumerate() {
+        let layers = facts["layers"].as_array().unwrap().iter();
+        let sum: f64 = layers
+            .map(|l| l["absorbed_W"][band].as_f64().unwrap())
+            .sum();
+        let total = balance["absorbed_plants_W"]["value"].as_f64().unwrap();
+        assert!((sum - total).abs() < 1e-7 * total, "{sum} of {total}");
+    }
+    for outside in ["http://", "https://", "src="] {
+        assert!(!page.contains(outside), "{outside}");
+    }
+
+    let (said, good) = report(folder.path(), &["--png", "pic.png", "--png-band", "UV"]);
+    assert!(!good && said.contains("PAR, NIR"), "{said}");
+    let (said, good) = report(folder.path(), &["--png", "pic.png", "--png-band", "NIR"]);
+    assert!(good, "{said}");
+    let picture = fs::read(folder.path().join("pic.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG") && picture.len() > 20_000);
+    // nothing is left beside it
+    let left = fs::read_dir(folder.path().join("out")).unwrap();
+    let hidden = left.filter(|f| {
+        f.as_ref()
+            .unwrap()
+            .file_name()
+            .to_string_lossy()
+            .starts_with('.')
+    });
+    assert_eq!(hidden.count(), 0);
+}
+
+#[test]
+fn a_canopy_that_is_too_large_is_not_drawn() {
+    let folder = solved("csv");
+    let (said, good) = report(folder.path(), &["--most-triangles", "10"]);
+    assert!(good && said.contains("not drawn"), "{said}");
+    let page = page(folder.path());
+    assert!(!page.contains("id=\"vertices\""));
+    assert!(facts(&page)["not_drawn"].is_string());
+}
+
+#[test]
+fn what_cannot_be_reported_is_said() {
+    let folder = solved("csv");
+    let at = |name: &str| folder.path().join(name);
+
+    // another canopy
+    fs::rename(at("bean.can"), at("moved.can")).unwrap();
+    let (said, good) = report(folder.path(), &[]);
+    assert!(
+        !good && said.contains("bean.can") && said.contains("--scene"),
+        "{said}"
+    );
+    let (said, good) = report(folder.path(), &["--scene", "moved.can"]);
+    assert!(good, "{said}");
+    let text = fs::read_to_string(at("moved.can")).unwrap();
+    fs::write(
+        at("bean.can"),
+        text + "p 1 100001001001 3 0 0 1 1 0 1 0 1 1\n",
+    )
+    .unwrap();
+    let (said, good) = report(folder.path(), &[]);
+    assert!(!good && said.contains("triangles"), "{said}");
+
+    // no result
+    fs::remove_file(at("out/summary.json")).unwrap();
+    let (said, good) = report(folder.path(), &[]);
+    assert!(!good && said.contains("summary.json"), "{said}");
+}
+
+#[test]
+fn parquet_is_refused() {
+    let folder = solved("parquet");
+    let (said, good) = report(folder.path(), &[]);
+    assert!(!good && said.contains("--format csv"), "{said}");
+}
+
+fn chromium() -> Option<PathBuf> {
+    let path = std::env::var_os("PATH")?;
+    let names = ["chromium", "chromium-browser", "google-chrome"];
+    std::env::split_paths(&path)
+        .flat_map(|folder| names.map(|name| folder.join(name)))
+        .find(|program| program.is_file())
+}
+
+/// What the page says of itself in a browser, having drawn and having clicked an organ.
+fn seen(chromium: &Path, folder: &Path, organ: usize) -> Value {
+    let url = format!(
+        "file://{}#selftest={organ}",
+        folder.join("out/report.html").display()
+    );
+    let mut command = Command::new(chromium);
+    command
+        .args(["--headless", "--no-sandbox", "--disable-dev-shm-usage"])
+        .args(["--use-gl=angle", "--use-angle=swiftshader"])
+        .args(["--enable-unsafe-swiftshader", "--window-size=1000,900"])
+        .arg(format!(
+            "--user-data-dir={}",
+            folder.join("browser").display()
+        ))
+        .args(["--virtual-time-budget=20000", "--dump-dom", &url])
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    let output = wait_for(command.spawn().unwrap());
+    let dom = String::from_utf8_lossy(&output.stdout).into_owned();
+    let outcome = element(&dom, "selftest");
+    serde_json::from_str(outcome).unwrap_or_else(|error| {
+        panic!(
+            "{error} in {outcome:?}: {}",
+            String::from_utf8_lossy(&output.stderr)
+        )
+    })
+}
+
+#[test]
+fn a_browser_draws_it_and_picks_an_organ() {
+    let Some(chromium) = chromium() else {
+        // libtest shows it with --nocapture only: it goes past it
+        use std::io::Write;
+        let line = "\nSKIPPED: the report in a browser is not tested, no chromium on PATH\n";
+        std::io::stderr().write_all(line.as_bytes()).unwrap();
+        return;
+    };
+    let folder = solved("csv");
+    let (said, good) = report(folder.path(), &[]);
+    assert!(good, "{said}");
+    let facts = facts(&page(folder.path()));
+    let organs = facts["organs"].as_array().unwrap();
+    // a leaf in full light, which is seen from above
+    let bright = |k: &usize| organs[*k]["light"][0]["direct_W"].as_f64().unwrap();
+    let organ = (0..organs.len())
+        .max_by(|a, b| bright(a).total_cmp(&bright(b)))
+        .unwrap();
+
+    let seen = seen(&chromium, folder.path(), organ);
+    assert!(seen["error"].is_null(), "{seen}");
+    assert_eq!(seen["gl_error"], 0, "{seen}");
+    let (drawn, pixels) = (
+        seen["drawn"].as_u64().unwrap(),
+        seen["pixels"].as_u64().unwrap(),
+    );
+    assert!(drawn > pixels / 50 && drawn < pixels, "{seen}");
+    assert!(seen["colours"].as_u64().unwrap() > 50, "{seen}");
+    assert_eq!(seen["picked"], organ, "{seen}");
+    let panel = seen["panel"].as_str().unwrap();
+    let name = organs[organ]["organ"].as_str().unwrap();
+    assert!(panel.contains(&format!("organ {name}")), "{panel}");
+    // as many digits as the standard error leaves
+    let light = &organs[organ]["light"][0];
+    let (value, se) = (
+        light["absorbed_W"].as_f64().unwrap(),
+        light["se_W"].as_f64().unwrap(),
+    );
+    let decimals = (1.0 - se.log10().floor()).max(0.0) as usize;
+    let shown = format!("{value:.decimals$} ± {se:.decimals$}");
+    assert!(panel.contains(&shown), "{shown} in {panel}");
+}
