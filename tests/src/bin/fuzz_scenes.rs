@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use nestrad_tests::extremes::run;
-use nestrad_tests::extremes::wild::case;
+use nestrad_tests::extremes::wild::{UNBALANCED, case};
 
 fn main() -> ExitCode {
     let number = |n: usize, default: u64| -> u64 {
@@ -21,10 +21,14 @@ fn main() -> ExitCode {
         Instant::now() + Duration::from_secs(number(1, 60)),
         number(2, 0),
     );
-    let (mut seed, mut refused, mut failed) = (first, 0, 0);
+    let (mut seed, mut refused, mut unbalanced, mut failed) = (first, 0, 0, 0);
     while Instant::now() < end {
         let row = run(case(seed));
         match &row.verdict {
+            Ok(seen) if seen.happens == UNBALANCED => {
+                unbalanced += 1;
+                eprintln!("seed {seed}: {}", seen.figure);
+            }
             Ok(seen) => refused += u64::from(seen.happens == "refused"),
             Err(fault) => {
                 failed += 1;
@@ -34,6 +38,8 @@ fn main() -> ExitCode {
         seed += 1;
     }
     let all = seed - first;
-    eprintln!("{all} scenes from seed {first}: {refused} refused, {failed} failed");
+    eprintln!(
+        "{all} scenes from seed {first}: {refused} refused, {unbalanced} out of balance, {failed} failed"
+    );
     ExitCode::from(u8::from(failed > 0))
 }

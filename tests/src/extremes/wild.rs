@@ -1,11 +1,16 @@
 //! Wild scenes: solved soundly or refused, whatever they are.
 
 use nestrad_master::plan::{Plan, Settings};
+use nestrad_master::run::RunError;
 
 use super::judge::{refusal, solving, sound};
 use super::{Case, Seen};
 use crate::random::wild;
 use crate::solving::finish;
+
+/// What happens where the program itself finds that light is missing: a refusal, but one that a seed must not
+/// hide behind.
+pub const UNBALANCED: &str = "refused as out of balance";
 
 /// A scene by its seed. It need not balance better than so few lines can tell.
 pub fn case(seed: u64) -> Case {
@@ -41,6 +46,10 @@ pub fn case(seed: u64) -> Case {
                         finished.solution.organs.len()
                     )))
                 }
+                Err(fault @ RunError::Unbalanced { .. }) => Ok(Seen {
+                    happens: UNBALANCED,
+                    figure: fault.to_string(),
+                }),
                 Err(fault) => message(refusal(fault)),
             }
         },
