@@ -1,10 +1,10 @@
 //! What a solve gives: light per organ, per triangle and per soil cell, and the energy balance.
 
 use glam::DVec2;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// A value with its standard error, in the same unit.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Estimate {
     /// The value.
     pub value: f64,
@@ -43,7 +43,7 @@ pub struct SoilMap {
 }
 
 /// Where the energy of a band goes, in W per pattern (or per scene, when there is no pattern).
-#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
 pub struct Balance {
     /// Name of the band.
     pub band: String,

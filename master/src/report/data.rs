@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::ReportError;
 use super::profile::PatchLight;
 use super::table::Table;
+use crate::solution::Balance;
 
 /// What a report needs of `summary.json`.
 #[derive(Clone, Debug, Deserialize)]
@@ -55,25 +56,6 @@ pub(crate) struct Plan {
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct Scale {
     pub(crate) ground_area_m2: f64,
-}
-
-/// A value with its standard error.
-#[derive(Clone, Copy, Debug, Deserialize, Serialize)]
-pub(crate) struct Estimate {
-    pub(crate) value: f64,
-    pub(crate) se: f64,
-}
-
-/// The energy balance of a band, W.
-#[derive(Clone, Debug, Deserialize, Serialize)]
-pub(crate) struct Balance {
-    pub(crate) band: String,
-    pub(crate) incoming_W: f64,
-    pub(crate) absorbed_plants_W: Estimate,
-    pub(crate) absorbed_soil_W: Estimate,
-    pub(crate) escaped_up_W: Estimate,
-    pub(crate) escaped_down_W: Estimate,
-    pub(crate) closure_W: Estimate,
 }
 
 /// Standard error over all organs.

@@ -13,17 +13,19 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nestrad_common::assemble::load_scene;
+use nestrad_common::geometry;
 use nestrad_common::inputs::Inputs;
 use nestrad_common::scene::{Material, Scene};
 use serde::Serialize;
 
 pub use self::error::ReportError;
 
-use self::data::{Balance, Organ, OrganErrors, Results, Soil};
+use self::data::{Organ, OrganErrors, Results, Soil};
 use self::page::Blob;
 use self::profile::{LIT_STEP, Layer, Patch};
 use crate::output::atomic::Staging;
 use crate::output::{OutputError, REPORT};
+use crate::solution::Balance;
 
 /// Layers of the vertical profile.
 const LAYERS: usize = 20;
@@ -250,8 +252,7 @@ fn difference(scene: &Scene, results: &Results) -> Option<String> {
                 "triangle {t} is of organ {own}, in the results of {other}"
             ));
         }
-        let [a, b, c] = scene.triangles[t];
-        let own = (b - a).cross(c - a).length() / 2.0;
+        let own = geometry::area(&scene.triangles[t]);
         let other = results.triangles.area_m2[t];
         // a triangle without area has none in the results
         let differs = other > 0.0 && (own - other).abs() > SAME_AREA * own.max(other);
