@@ -8,6 +8,7 @@
     reason = "units in names are written as units: irradiance_W_m2"
 )]
 
+pub mod above;
 pub mod assemble;
 pub mod directions;
 pub mod elements;

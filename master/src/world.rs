@@ -2,6 +2,7 @@
 //! of all that can be seen.
 
 use glam::{DVec2, DVec3};
+use nestrad_common::above::Above;
 use nestrad_common::elements::Elements;
 use nestrad_common::ends::Ends;
 use nestrad_common::geometry;
@@ -131,6 +132,24 @@ impl World {
         match self.elements.area_m2.get(row as usize / 2) {
             Some(&area) => area,
             None => self.soil.map_or(0.0, |s| s.cell_area_m2()),
+        }
+    }
+
+    /// The part of a row (a face of an element, or a soil cell) that the soil leaves in the open: of what it does
+    /// not cut, all; how deep that lies, its lines tell.
+    pub fn uncut(&self, row: u32) -> f64 {
+        let element = row / 2;
+        let (Some(&t), Some(soil)) = (self.triangle_of_element.get(element as usize), &self.soil)
+        else {
+            return 1.0;
+        };
+        let piece = (
+            element - self.elements.first[t as usize],
+            self.elements.divisions[t as usize],
+        );
+        match Above::of(&self.soup.triangles()[t as usize], piece, soil.z_m) {
+            Above::Part(part) => part.share,
+            Above::Whole | Above::Nothing => 1.0,
         }
     }
 

@@ -1,6 +1,7 @@
 //! A block, checked and made ready for the kernel.
 
 use glam::{DVec2, DVec3};
+use nestrad_common::above::Above;
 use nestrad_common::ends::Ends;
 use nestrad_common::geometry;
 use nestrad_common::lattice::{Extent, Soup};
@@ -28,6 +29,8 @@ pub struct Block {
     pub(crate) seen_as: Vec<u32>,
     /// Whether each local element is on the surface of something solid.
     pub(crate) solid: Vec<bool>,
+    /// Whether the soil cuts each local element.
+    pub(crate) cut_by_soil: Vec<bool>,
     /// One-sided area of each local element, m².
     pub(crate) area_m2: Vec<f64>,
     /// Row of each local end; [`Self::rows`] for an end that has none here.
@@ -148,7 +151,7 @@ impl Block {
         let is_own = |(k, &number): (usize, &u32)| number as usize == k;
         let whole = seen_as.iter().enumerate().all(is_own)
             && row[..rows as usize].iter().enumerate().all(is_own);
-        Ok(Self {
+        let mut block = Self {
             whole,
             extent: Extent {
                 min_m,
@@ -164,10 +167,25 @@ impl Block {
             local_faces,
             seen_as,
             solid,
+            cut_by_soil: Vec::new(),
             area_m2,
             row,
             rows: rows as usize,
-        })
+        };
+        block.cut_by_soil = (0..count)
+            .flat_map(|t| (block.first[t]..block.first[t + 1]).map(move |local| (t, local)))
+            .map(|(t, local)| matches!(block.above_soil(t, local), Above::Part(_)))
+            .collect();
+        Ok(block)
+    }
+
+    /// What of a local element, a piece of a triangle, stands above the soil plane.
+    pub(crate) fn above_soil(&self, triangle: usize, local: u32) -> Above {
+        let (corners, Some(soil)) = (&self.soup.triangles()[triangle], &self.soil) else {
+            return Above::Whole;
+        };
+        let piece = (local - self.first[triangle], self.divisions[triangle]);
+        Above::of(corners, piece, soil.z_m)
     }
 
     /// Number of ends of the whole scene.

@@ -58,7 +58,11 @@ impl Exchange {
         };
         Outlook {
             weight: [0, 1].map(|h: usize| seen.iter().map(|s| per(1, s[h].counted)).collect()),
-            exposed: seen.iter().map(exposed).collect(),
+            exposed: seen
+                .par_iter()
+                .enumerate()
+                .map(|(row, seen)| world.uncut(row as u32) * exposed(seen))
+                .collect(),
             to_sky: part(|s| s.sky),
             to_void: part(|s| s.void),
             outer_soil: seen

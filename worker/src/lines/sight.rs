@@ -45,9 +45,12 @@ impl<'a> Sight<'a> {
         if hits.iter().any(|h| self.block.is_solid(h.face_along())) {
             bury(self.block, hits, self.radius, pairs, start);
         }
-        // what lies under the soil gets no light and is not seen
+        // what lies under the soil gets no light and is not seen; how much that is of what the soil cuts is known
         let buried = self.block.local(self.block.ends.buried());
         for hit in under {
+            if self.block.cut_by_soil[hit.face_along() as usize / 2] {
+                continue;
+            }
             pairs.push((hit.face_against(), buried));
             pairs.push((hit.face_along(), buried));
         }

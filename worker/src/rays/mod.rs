@@ -11,6 +11,7 @@ mod tree;
 use std::ops::Range;
 
 use glam::{DVec2, DVec3};
+use nestrad_common::above::Above;
 use nestrad_common::directions::{Purpose, stream};
 use nestrad_common::{elements, geometry};
 use nestrad_proto::v1;
@@ -107,7 +108,12 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
             if !block.has_row(face) {
                 continue;
             }
-            let count = plan.rays_of(block.area_m2[local as usize], longest_m, global);
+            let above = block.above_soil(t, local);
+            let area_m2 = match &above {
+                Above::Part(part) => part.share * block.area_m2[local as usize],
+                Above::Whole | Above::Nothing => block.area_m2[local as usize],
+            };
+            let count = plan.rays_of(area_m2, longest_m, global);
             if count == 0 {
                 continue;
             }
@@ -115,8 +121,12 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
             let outward = if side == 0 { normal } else { -normal };
             let corners = elements::piece_corners(n, local - block.first[t]);
             for k in 0..count {
-                let random = [rng.random(), rng.random()];
-                let origin = geometry::point_within(triangle, &corners, random);
+                let [first, second] = [rng.random(), rng.random()];
+                let (corners, first) = match &above {
+                    Above::Part(part) => part.triangle(first),
+                    Above::Whole | Above::Nothing => (corners, first),
+                };
+                let origin = geometry::point_within(triangle, &corners, [first, second]);
                 let direction = cosine_direction(outward, (k, count), &mut rng);
                 let ray = FaceRay {
                     face,
