@@ -14,6 +14,11 @@ pub const UNBALANCED: &str = "refused as out of balance";
 
 /// A scene by its seed. It need not balance better than so few lines can tell.
 pub fn case(seed: u64) -> Case {
+    case_within(seed, 0.25)
+}
+
+/// The same with another limit of memory.
+pub fn case_within(seed: u64, memory_GiB: f64) -> Case {
     Case::new(
         "Wild",
         seed.to_string(),
@@ -31,7 +36,7 @@ pub fn case(seed: u64) -> Case {
             };
             let settings = Settings {
                 accuracy_percent: 10.0,
-                memory_GiB: 0.25,
+                memory_GiB,
                 ..Settings::default()
             };
             let plan = match Plan::new(&problem, &settings) {
