@@ -16,6 +16,7 @@ pub mod plan;
 pub mod remote;
 pub mod report;
 pub mod results;
+pub mod rounds;
 pub mod run;
 pub mod service;
 pub mod solution;

@@ -12,6 +12,7 @@ use crate::exchange::{
 };
 use crate::far_field::closure::{FarRows, from_layers};
 use crate::order::Ordered;
+use crate::output::errors::{ErrorParts, error_parts};
 use crate::output::progress::{Cancelled, Progress};
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
@@ -28,6 +29,8 @@ pub struct Finished {
     pub solution: Solution,
     /// How much was computed.
     pub counters: Counters,
+    /// What the errors of organs come from, by band.
+    pub errors: Vec<ErrorParts>,
 }
 
 /// How much was computed.
@@ -183,7 +186,13 @@ pub fn solve_with(
         irradiance: &irradiance,
         scattering: &plan.scattering_bands,
     };
-    let solution = ordered.back(parts.assemble());
+    let solution = parts.assemble();
+    let left = |band| {
+        let place = plan.scattering_bands.iter().position(|&b| b == band);
+        place.map_or(0.0, |k| irradiance.left[k])
+    };
+    let errors = error_parts(&problem.scene, &solution, &direct.organ_variance_W2, left);
+    let solution = ordered.back(solution);
     check_balance(&solution)?;
     watch.lap("results");
     progress.finish();
@@ -194,7 +203,11 @@ pub fn solve_with(
         jobs: exchange.jobs,
         passes: irradiance.passes,
     };
-    Ok(Finished { solution, counters })
+    Ok(Finished {
+        solution,
+        counters,
+        errors,
+    })
 }
 
 /// The exchange, traced in this process.

@@ -79,6 +79,12 @@ fn a_sliver_along_a_long_and_narrow_scene_is_lit() {
     solved(6028);
 }
 
+/// Two points one above the other and no soil: a lattice of 10^14 lines through a box of no area.
+#[test]
+fn points_alone_take_no_time() {
+    solved(4_010_026);
+}
+
 /// A bright leaf before a sheet of 3 km² that is otherwise dark: what it sends there was lost, three fifths of
 /// all light, with a standard error of nothing.
 #[test]

@@ -28,6 +28,26 @@ pub struct Extent {
     pub periodic: bool,
 }
 
+impl Extent {
+    /// Lower corner and size of its shadow on the level of its lowest point.
+    fn sheared(&self, shear: DVec2) -> (DVec2, DVec2) {
+        let (mut lo, mut hi) = (self.min_m.truncate(), self.max_m.truncate());
+        if !self.periodic {
+            let slide = -shear * (self.max_m.z - self.min_m.z);
+            lo += slide.min(DVec2::ZERO);
+            hi += slide.max(DVec2::ZERO);
+        }
+        (lo, (hi - lo).max(DVec2::splat(f64::MIN_POSITIVE)))
+    }
+
+    /// Lines of that cross-section (m²) along a direction (a unit vector, z > 0) that it takes to fill it, however
+    /// many: a lattice has no more than it can number.
+    pub fn lines_through(&self, direction: DVec3, line_area_m2: f64) -> f64 {
+        let (_, size) = self.sheared(direction.truncate() / direction.z);
+        size.x * size.y * direction.z / line_area_m2
+    }
+}
+
 /// Parallel lines along one direction, on a lattice of `nx * ny` points.
 ///
 /// Coordinates `(u, v)` are in lattice steps, so that lines pass through whole numbers; `s` is the
@@ -101,15 +121,8 @@ impl Lattice {
     pub fn new(direction: DVec3, extent: &Extent, line_area_m2: f64, random: [f64; 3]) -> Self {
         let d = direction;
         let shear = DVec2::new(d.x / d.z, d.y / d.z);
-        // sheared to the level z = min z
         let height = extent.max_m.z - extent.min_m.z;
-        let (mut lo, mut hi) = (extent.min_m.truncate(), extent.max_m.truncate());
-        if !extent.periodic {
-            let slide = -shear * height;
-            lo += slide.min(DVec2::ZERO);
-            hi += slide.max(DVec2::ZERO);
-        }
-        let size = (hi - lo).max(DVec2::splat(f64::MIN_POSITIVE));
+        let (lo, size) = extent.sheared(shear);
         // Cross-sections stay close to squares: what a slanted direction stretches is the step
         // along its azimuth.
         let side = line_area_m2.sqrt();

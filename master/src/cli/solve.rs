@@ -20,9 +20,11 @@ use nestrad_master::output::summary::Summary;
 use nestrad_master::output::{self, Formats, TableFormat, terminal};
 use nestrad_master::plan::{Estimator, Plan, Settings};
 use nestrad_master::remote::Remote;
-use nestrad_master::run::{self, Counters, Finished, Means};
+use nestrad_master::rounds::{Accuracy, Round, solve_in_rounds};
+use nestrad_master::run::{Counters, Means};
 use nestrad_master::solution::Solution;
 use rayon::ThreadPoolBuilder;
+use serde::Deserialize;
 
 use super::console::{self, Notes};
 use super::flags::{SceneFlags, positive};
@@ -67,12 +69,19 @@ struct HowFlags {
     #[arg(long, value_name = "auto|inf|METRES", allow_negative_numbers = true)]
     diameter: Option<Diameter>,
 
-    /// Standard error to aim at, percent: rms over organs, relative to the canopy's mean [default: 0.5]
+    /// Standard error to reach, percent: rms over organs, relative to the canopy's mean [default: 0.5]
     ///
-    /// It sets how many lines are traced, and how many directions a built-in sky has (476 at 0.5 %,
-    /// 200 at 1 %, 85 at 2 %; 4000 at most).
+    /// It sets how many lines are traced; where a round misses it in some band, a finer one follows.
+    /// It also sets how many directions a built-in sky has (476 at 0.5 %, 200 at 1 %, 85 at 2 %; 4000 at
+    /// most).
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     accuracy: Option<f64>,
+
+    /// Seconds that the solve may take: it stops with the best that it can reach, and says what that is
+    ///
+    /// Results then depend on how fast the machine is.
+    #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
+    budget: Option<f64>,
 
     /// Memory that the solve may take, GiB [default: 8]
     #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
@@ -137,7 +146,7 @@ impl SolveArgs {
         let options = self.options();
         let inputs = self.scene.inputs(options)?;
         let task = Task {
-            settings: settings(&inputs.options, self.how.estimator),
+            settings: settings(&inputs.options, &self.how),
             notes: Notes {
                 quiet: self.results.quiet,
             },
@@ -154,14 +163,15 @@ impl SolveArgs {
     }
 }
 
-fn settings(options: &Options, estimator: EstimatorFlag) -> Settings {
+fn settings(options: &Options, how: &HowFlags) -> Settings {
     let default = Settings::default();
     Settings {
         diameter: options.diameter.unwrap_or(default.diameter),
         accuracy_percent: options.accuracy_percent.unwrap_or(default.accuracy_percent),
+        budget_s: how.budget,
         memory_GiB: options.memory_GiB.unwrap_or(default.memory_GiB),
         seed: options.seed.unwrap_or(default.seed),
-        estimator: match estimator {
+        estimator: match how.estimator {
             EstimatorFlag::Lines => Estimator::Lines,
             EstimatorFlag::Rays => Estimator::Rays,
         },
@@ -182,7 +192,7 @@ struct Task {
 /// What came of it, here or at a master.
 struct Computed {
     solution: Solution,
-    plan: Box<dyn erased_serde::Serialize>,
+    plan: serde_json::Value,
     counters: Counters,
     stages: Vec<Stage>,
     usage: Usage,
@@ -211,10 +221,7 @@ impl Task {
     }
 
     fn compute(&self, problem: &Problem, watch: &mut Stopwatch) -> Result<Computed> {
-        let plan = Plan::new(problem, &self.settings)?;
-        for line in &plan.reasons {
-            self.notes.say("plan", line);
-        }
+        let begins = |plan: &Plan, before: &[Round]| self.begins(plan, before);
         let progress = Progress::new(self.notes.quiet);
         let kept = self.state.open()?;
         let crew = self.workers.crew(self.settings.memory_GiB, self.notes)?;
@@ -222,8 +229,8 @@ impl Task {
             workers: crew.as_ref().map(Crew::cluster),
             kept: kept.as_ref(),
         };
-        let finished = run::solve_with(problem, &plan, means, &progress, watch)?;
-        let Finished { solution, counters } = finished;
+        let settings = &self.settings;
+        let reached = solve_in_rounds(problem, settings, means, &progress, watch, begins)?;
         drop(crew);
         if let Some(kept) = kept {
             kept.close();
@@ -232,12 +239,31 @@ impl Task {
             }
         }
         Ok(Computed {
-            solution,
-            plan: Box::new(plan),
-            counters,
+            plan: serde_json::to_value(reached.record())
+                .context("the plan cannot be written down")?,
+            solution: reached.finished.solution,
+            counters: reached.finished.counters,
             stages: Vec::new(),
             usage: Usage::default(),
         })
+    }
+
+    /// Says what the next round does.
+    fn begins(&self, plan: &Plan, before: &[Round]) {
+        if let Some(Round {
+            planned_percent,
+            reached_percent: Some(reached),
+        }) = before.last()
+        {
+            let round = before.len();
+            let line = format!(
+                "round {round}, planned for {planned_percent:.3} %, reached {reached:.3} %"
+            );
+            self.notes.say("accuracy", &line);
+        }
+        for line in &plan.reasons {
+            self.notes.say("plan", line);
+        }
     }
 
     /// The problem, with a sky turned into sources.
@@ -287,12 +313,21 @@ impl Task {
         if self.notes.quiet {
             return Ok(());
         }
+        self.say_accuracy(&computed.plan);
         let mut table = Vec::new();
         terminal::write(&mut table, scene, solution, usage)?;
         console::print(&table)?;
         let place = self.out.display();
         self.notes.say("done", &format!("results are in {place}"));
         Ok(())
+    }
+
+    /// Says whether the accuracy was reached, and what the error comes from.
+    fn say_accuracy(&self, plan: &serde_json::Value) {
+        // a master of an earlier version says nothing of it
+        if let Ok(accuracy) = Accuracy::deserialize(&plan["accuracy"]) {
+            self.notes.say("accuracy", &accuracy.to_string());
+        }
     }
 
     fn formats(&self) -> Formats {
@@ -319,7 +354,7 @@ fn elsewhere(remote: Remote) -> Result<Computed> {
     });
     Ok(Computed {
         solution,
-        plan: Box::new(plan),
+        plan,
         counters: Counters {
             elements: summary.elements as usize,
             direct_lines: summary.direct_lines,

@@ -13,7 +13,7 @@ mod probe;
 mod source;
 
 use nestrad_common::directions::{Purpose, stream};
-use nestrad_common::lattice::{Extent, Lattice};
+use nestrad_common::lattice::Extent;
 use nestrad_common::light::Source;
 use nestrad_common::problem::Problem;
 use nestrad_worker::BlockFault;
@@ -150,17 +150,13 @@ pub fn spread_effort(
             let area = (finest_m2 * part).min(fewest).max(f64::MIN_POSITIVE);
             // low light drags the box of an open scene far out
             let most = MOST_TIMES * (ground_area_m2 / finest_m2).max(FEWEST_POINTS);
-            area * (points_of(source, extent, area) / most).max(1.0)
+            area * (extent.lines_through(-source.direction, area) / most).max(1.0)
         })
         .collect();
-    let points = |(source, area): (&Source, &f64)| points_of(source, extent, *area);
+    let points = |(source, &area): (&Source, &f64)| extent.lines_through(-source.direction, area);
     let all: f64 = problem.sources.iter().zip(&wanted).map(points).sum();
     let too_many = (all / MOST_POINTS).max(1.0);
     wanted.iter().map(|area| area * too_many).collect()
-}
-
-fn points_of(source: &Source, extent: &Extent, line_area_m2: f64) -> f64 {
-    Lattice::new(-source.direction, extent, line_area_m2, [0.0, 0.0, 0.5]).lines() as f64
 }
 
 /// No source is drawn with more points than this many times those that the strongest has on the ground.

@@ -29,6 +29,9 @@ pub struct Settings {
     pub diameter: Diameter,
     /// Standard error to aim at: rms over organs, in percent of the mean absorbed power per area.
     pub accuracy_percent: f64,
+    /// Seconds that the solve may take; what is reached by then has to do. Results then depend on how fast the
+    /// machine is.
+    pub budget_s: Option<f64>,
     /// Memory that the solve may take, GiB.
     pub memory_GiB: f64,
     /// Start of all random numbers.
@@ -52,6 +55,7 @@ impl Default for Settings {
         Self {
             diameter: Diameter::Auto,
             accuracy_percent: DEFAULT_ACCURACY_PERCENT,
+            budget_s: None,
             memory_GiB: 8.0,
             seed: 1,
             estimator: Estimator::default(),

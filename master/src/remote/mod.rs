@@ -142,6 +142,7 @@ fn options(settings: &Settings) -> v1::SolveOptions {
         memory_gi_b: Some(settings.memory_GiB),
         seed: Some(settings.seed),
         estimator: estimator.into(),
+        budget_s: settings.budget_s,
     }
 }
 

@@ -12,10 +12,10 @@ use super::metrics::Metrics;
 use super::outcome::Outcome;
 use super::scenes::HeldScene;
 use super::solves::{Job, Solves, State};
-use crate::output::progress::Cancelled;
 use crate::output::resources::Stopwatch;
-use crate::plan::{Plan, PlanError};
-use crate::run::{self, Means, RunError};
+use crate::plan::Plan;
+use crate::rounds::{Round, RoundsError, solve_in_rounds};
+use crate::run::Means;
 
 /// Solves what is in the queue, one solve after the other, until the master stops.
 pub(super) fn work<'a>(
@@ -68,11 +68,7 @@ fn solve(job: &Job, means: Means, metrics: &Metrics) -> State {
 #[derive(Debug, Error)]
 enum Fault {
     #[error(transparent)]
-    Plan(#[from] PlanError),
-    #[error(transparent)]
-    Run(#[from] RunError),
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
+    Rounds(#[from] RoundsError),
     #[error("the plan cannot be written down")]
     Json(#[from] serde_json::Error),
 }
@@ -93,11 +89,9 @@ fn outcome(job: &Job, means: Means, scene: &HeldScene) -> Result<Outcome, Fault>
     let mut watch = Stopwatch::start();
     job.progress.stage("plan", 0);
     let problem = scene.problem();
-    let plan = Plan::new(&problem, &job.settings)?;
-    job.set_plan(&plan.reasons);
-    watch.lap("plan");
-    job.progress.check()?;
-    let finished = run::solve_with(&problem, &plan, means, &job.progress, &mut watch)?;
+    let (settings, progress) = (&job.settings, &job.progress);
+    let begins = |plan: &Plan, _: &[Round]| job.set_plan(&plan.reasons);
+    let reached = solve_in_rounds(&problem, settings, means, progress, &mut watch, begins)?;
     let usage = watch.usage();
-    Ok(Outcome::new(scene, &plan, finished, watch.stages(), usage)?)
+    Ok(Outcome::new(scene, reached, watch.stages(), usage)?)
 }

@@ -6,7 +6,7 @@ use nestrad_proto::v1;
 use super::scenes::HeldScene;
 use crate::output::errors::organ_errors;
 use crate::output::resources::{Stage, Usage};
-use crate::plan::Plan;
+use crate::rounds::Reached;
 use crate::run::Finished;
 use crate::solution::{Estimate, ItemLight, Solution};
 
@@ -26,13 +26,15 @@ pub(super) struct Outcome {
 impl Outcome {
     pub(super) fn new(
         scene: &HeldScene,
-        plan: &Plan,
-        finished: Finished,
+        reached: Reached,
         stages: &[Stage],
         usage: Usage,
     ) -> Result<Self, serde_json::Error> {
         let geometry = &scene.geometry().scene;
-        let Finished { solution, counters } = finished;
+        let plan_json = serde_json::to_string(&reached.record())?;
+        let Finished {
+            solution, counters, ..
+        } = reached.finished;
         let errors = organ_errors(geometry, &solution);
         let bands = solution.balance.iter().zip(errors);
         let bands = bands.map(|(balance, error)| v1::BandSummary {
@@ -48,7 +50,7 @@ impl Outcome {
         let summary = v1::SolveSummary {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             bands: bands.collect(),
-            plan_json: serde_json::to_string(plan)?,
+            plan_json,
             elements: counters.elements as u64,
             direct_lines: counters.direct_lines,
             lines: counters.exchange.lines,

@@ -54,6 +54,10 @@ pub(in crate::service) fn settings(
     Ok(Settings {
         diameter,
         accuracy_percent: above_zero("accuracy_percent", accuracy, default.accuracy_percent)?,
+        budget_s: match given.budget_s {
+            Some(_) => Some(above_zero("budget_s", given.budget_s, 0.0)?),
+            None => None,
+        },
         memory_GiB,
         seed: given.seed.unwrap_or(default.seed),
         estimator,

@@ -353,6 +353,7 @@ fn options_have_the_defaults_of_the_command_line() {
     );
     let given = of(v1::SolveOptions {
         diameter_m: Some(f64::INFINITY),
+        budget_s: Some(60.0),
         accuracy_percent: Some(1.0),
         memory_gi_b: Some(2.0),
         seed: Some(0),

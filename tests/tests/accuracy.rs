@@ -1,0 +1,150 @@
+//! `--accuracy` means what it says: rounds end when the error is what was asked for, and it is what it says.
+
+#![allow(clippy::unwrap_used)]
+
+use nestrad_common::generate::{Maize, Stand};
+use nestrad_common::problem::Problem;
+use nestrad_master::output::progress::Progress;
+use nestrad_master::output::resources::Stopwatch;
+use nestrad_master::plan::{Estimator, Settings};
+use nestrad_master::rounds::{Ended, Reached, solve_in_rounds};
+use nestrad_master::run::Means;
+use nestrad_master::solution::Solution;
+use nestrad_tests::canopies::{par_and_nir, problem, uniform_sky};
+use nestrad_tests::solving::{plan, solve};
+
+fn reach(problem: &Problem, settings: &Settings) -> Reached {
+    let (means, progress) = (Means::default(), Progress::new(true));
+    let watch = &mut Stopwatch::start();
+    solve_in_rounds(problem, settings, means, &progress, watch, |_, _| ()).unwrap()
+}
+
+fn maize() -> Problem {
+    let plant = Maize {
+        stand: Stand {
+            rows: 1,
+            plants_per_row: 1,
+            row_spacing_m: 0.5,
+            plant_spacing_m: 0.25,
+        },
+        leaf_triangle_m2: 1e-3,
+        ..Maize::default()
+    };
+    problem(
+        &plant.generate().unwrap(),
+        &par_and_nir(),
+        uniform_sky(46, 2),
+    )
+}
+
+/// Rms over organs of how far absorbed powers per area lie apart, percent of the mean; and the same of their
+/// standard errors.
+fn apart_percent(a: &Solution, b: &Solution, band: usize) -> (f64, f64) {
+    let bands = a.balance.len();
+    let (mut area, mut mean, mut square, mut stated) = (0.0, 0.0, 0.0, 0.0);
+    for (organ, &own) in a.organ_area_m2.iter().enumerate() {
+        let [x, y] = [a, b].map(|s| &s.organs[organ * bands + band]);
+        area += own;
+        mean += y.absorbed_W;
+        square += (x.absorbed_W - y.absorbed_W).powi(2) / own;
+        stated += y.absorbed_se_W.powi(2) / own;
+    }
+    let percent = |sum: f64| 100.0 * (sum * area).sqrt() / mean;
+    (percent(square), percent(stated))
+}
+
+#[test]
+fn the_error_that_is_asked_for_is_reached_and_true() {
+    let problem = maize();
+    let by_rays = Settings {
+        estimator: Estimator::Rays,
+        accuracy_percent: 0.5,
+        seed: 77,
+        ..Settings::default()
+    };
+    let reference = solve(&problem, &by_rays).solution;
+    for asked in [2.0, 1.0, 0.5] {
+        let settings = Settings {
+            accuracy_percent: asked,
+            ..Settings::default()
+        };
+        let reached = reach(&problem, &settings);
+        assert_eq!(reached.accuracy.ended, Ended::Reached, "{asked}");
+        for (band, parts) in reached.accuracy.errors.iter().enumerate() {
+            assert!(parts.total_percent() <= asked, "{asked}: {parts:?}");
+            let (apart, of_reference) = apart_percent(&reached.finished.solution, &reference, band);
+            let own = (apart.powi(2) - of_reference.powi(2)).max(0.0).sqrt();
+            assert!(own <= asked, "{asked} {}: {own} of {parts:?}", parts.band);
+            // what is stated is neither far above the truth nor far below it, as far as nine organs can tell
+            let ratio = apart / parts.total_percent().hypot(of_reference);
+            assert!((0.3..2.2).contains(&ratio), "{asked}: {ratio} of {parts:?}");
+        }
+    }
+}
+
+#[test]
+fn a_round_that_misses_is_followed_by_a_finer_one() {
+    // organs of one small triangle each are met by few lines
+    let mut problem = maize();
+    let scene = &mut problem.scene;
+    let organs = scene.triangles.len() as u32;
+    scene.organs = (0..organs)
+        .map(|k| nestrad_common::scene::Organ {
+            id: k.to_string(),
+            plant: "0".to_owned(),
+        })
+        .collect();
+    scene.organ = (0..organs).collect();
+    let reached = reach(
+        &problem,
+        &Settings {
+            accuracy_percent: 1.0,
+            ..Settings::default()
+        },
+    );
+    let accuracy = &reached.accuracy;
+    assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
+    assert!(accuracy.rounds.len() > 1, "{accuracy:?}");
+    let planned: Vec<f64> = accuracy.rounds.iter().map(|r| r.planned_percent).collect();
+    assert!(planned.is_sorted_by(|a, b| a > b), "{accuracy:?}");
+}
+
+#[test]
+fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
+    let settings = Settings {
+        accuracy_percent: 0.1,
+        budget_s: Some(1e-6),
+        ..Settings::default()
+    };
+    let accuracy = reach(&maize(), &settings).accuracy;
+    assert_eq!(accuracy.ended, Ended::OutOfTime);
+    assert_eq!(accuracy.rounds.len(), 1);
+    assert!(accuracy.rounds[0].reached_percent.unwrap() > 0.1);
+    assert!(accuracy.to_string().contains("the time allowed is up"));
+}
+
+#[test]
+fn without_memory_the_best_that_fits_has_to_do() {
+    let problem = maize();
+    let pilot = Settings {
+        accuracy_percent: 0.4,
+        ..Settings::default()
+    };
+    let settings = Settings {
+        accuracy_percent: 0.1,
+        budget_s: Some(1e6),
+        memory_GiB: 1.05 * plan(&problem, &pilot).memory.total_GiB(),
+        ..Settings::default()
+    };
+    let accuracy = reach(&problem, &settings).accuracy;
+    assert_eq!(accuracy.ended, Ended::OutOfMemory, "{accuracy:?}");
+}
+
+#[test]
+fn the_dark_has_no_error() {
+    let mut problem = maize();
+    problem.sources.clear();
+    let reached = reach(&problem, &Settings::default());
+    assert_eq!(reached.accuracy.ended, Ended::Reached);
+    assert!(reached.accuracy.errors.is_empty());
+}
