@@ -1,6 +1,6 @@
 //! Solves in rounds until the error that was asked for is reached.
 //!
-//! The first round is planned for what was asked. Where its own standard errors say that it missed, or where
+//! The first round is planned for what was asked, and is the only one where nothing was. Where its own standard errors say that it missed, or where
 //! time is short, the next is planned by what the last one measured: its error is taken to fall in proportion
 //! to the accuracy that is planned for, and its cost to rise with the square.
 
@@ -80,6 +80,8 @@ pub enum Ended {
     OutOfMemory,
     /// There have been enough.
     OutOfRounds,
+    /// No accuracy was asked for: what the default comes to has to do.
+    NotAsked,
 }
 
 impl fmt::Display for Accuracy {
@@ -92,10 +94,11 @@ impl fmt::Display for Accuracy {
             Ended::OutOfTime => ", because the time allowed is up",
             Ended::OutOfMemory => ", because finer plans are beyond the limits",
             Ended::OutOfRounds => ", however fine it was planned",
+            Ended::NotAsked => ", which is no more than the default: --accuracy sees to it",
         };
         write!(
             f,
-            "{:.2} % reached in {} of {} % asked for{why}; from exchange {:.2}, direct light {:.2}, solver {:.2} %: \
+            "{:.2} % reached in {}, aimed at {} %{why}; from exchange {:.2}, direct light {:.2}, solver {:.2} %: \
              {} is the largest",
             parts.total_percent(),
             parts.band,
@@ -154,6 +157,7 @@ pub fn solve_in_rounds(
         });
         let next = match worst.filter(|parts| parts.total_percent() > asked) {
             None => Err(Ended::Reached),
+            Some(_) if !settings.in_rounds => Err(Ended::NotAsked),
             Some(_) if rounds.len() >= MOST_ROUNDS => Err(Ended::OutOfRounds),
             Some(parts) => {
                 let finer = finer(planned, asked, parts);

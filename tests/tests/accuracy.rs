@@ -19,6 +19,14 @@ fn reach(problem: &Problem, settings: &Settings) -> Reached {
     solve_in_rounds(problem, settings, means, &progress, watch, |_, _| ()).unwrap()
 }
 
+fn asked(accuracy_percent: f64) -> Settings {
+    Settings {
+        accuracy_percent,
+        in_rounds: true,
+        ..Settings::default()
+    }
+}
+
 fn maize() -> Problem {
     let plant = Maize {
         stand: Stand {
@@ -63,21 +71,24 @@ fn the_error_that_is_asked_for_is_reached_and_true() {
         ..Settings::default()
     };
     let reference = solve(&problem, &by_rays).solution;
-    for asked in [2.0, 1.0, 0.5] {
-        let settings = Settings {
-            accuracy_percent: asked,
-            ..Settings::default()
-        };
-        let reached = reach(&problem, &settings);
-        assert_eq!(reached.accuracy.ended, Ended::Reached, "{asked}");
+    for percent in [2.0, 1.0, 0.5] {
+        let reached = reach(&problem, &asked(percent));
+        assert_eq!(reached.accuracy.ended, Ended::Reached, "{percent}");
         for (band, parts) in reached.accuracy.errors.iter().enumerate() {
-            assert!(parts.total_percent() <= asked, "{asked}: {parts:?}");
+            assert!(parts.total_percent() <= percent, "{percent}: {parts:?}");
             let (apart, of_reference) = apart_percent(&reached.finished.solution, &reference, band);
             let own = (apart.powi(2) - of_reference.powi(2)).max(0.0).sqrt();
-            assert!(own <= asked, "{asked} {}: {own} of {parts:?}", parts.band);
+            assert!(
+                own <= percent,
+                "{percent} {}: {own} of {parts:?}",
+                parts.band
+            );
             // what is stated is neither far above the truth nor far below it, as far as nine organs can tell
             let ratio = apart / parts.total_percent().hypot(of_reference);
-            assert!((0.3..2.2).contains(&ratio), "{asked}: {ratio} of {parts:?}");
+            assert!(
+                (0.3..2.2).contains(&ratio),
+                "{percent}: {ratio} of {parts:?}"
+            );
         }
     }
 }
@@ -95,13 +106,14 @@ fn a_round_that_misses_is_followed_by_a_finer_one() {
         })
         .collect();
     scene.organ = (0..organs).collect();
-    let reached = reach(
-        &problem,
-        &Settings {
-            accuracy_percent: 1.0,
-            ..Settings::default()
-        },
-    );
+    let once = Settings {
+        in_rounds: false,
+        ..asked(1.0)
+    };
+    let accuracy = reach(&problem, &once).accuracy;
+    assert_eq!(accuracy.ended, Ended::NotAsked, "{accuracy:?}");
+    assert_eq!(accuracy.rounds.len(), 1);
+    let reached = reach(&problem, &asked(1.0));
     let accuracy = &reached.accuracy;
     assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
     assert!(accuracy.rounds.len() > 1, "{accuracy:?}");
@@ -112,9 +124,8 @@ fn a_round_that_misses_is_followed_by_a_finer_one() {
 #[test]
 fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
     let settings = Settings {
-        accuracy_percent: 0.1,
         budget_s: Some(1e-6),
-        ..Settings::default()
+        ..asked(0.1)
     };
     let accuracy = reach(&maize(), &settings).accuracy;
     assert_eq!(accuracy.ended, Ended::OutOfTime);
@@ -126,15 +137,10 @@ fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
 #[test]
 fn without_memory_the_best_that_fits_has_to_do() {
     let problem = maize();
-    let pilot = Settings {
-        accuracy_percent: 0.4,
-        ..Settings::default()
-    };
     let settings = Settings {
-        accuracy_percent: 0.1,
         budget_s: Some(1e6),
-        memory_GiB: 1.05 * plan(&problem, &pilot).memory.total_GiB(),
-        ..Settings::default()
+        memory_GiB: 1.05 * plan(&problem, &asked(0.4)).memory.total_GiB(),
+        ..asked(0.1)
     };
     let accuracy = reach(&problem, &settings).accuracy;
     assert_eq!(accuracy.ended, Ended::OutOfMemory, "{accuracy:?}");

@@ -29,6 +29,8 @@ pub struct Settings {
     pub diameter: Diameter,
     /// Standard error to aim at: rms over organs, in percent of the mean absorbed power per area.
     pub accuracy_percent: f64,
+    /// Whether finer rounds follow where the first one misses the accuracy; it is sure to be asked for then.
+    pub in_rounds: bool,
     /// Seconds that the solve may take; what is reached by then has to do. Results then depend on how fast the
     /// machine is.
     pub budget_s: Option<f64>,
@@ -55,6 +57,7 @@ impl Default for Settings {
         Self {
             diameter: Diameter::Auto,
             accuracy_percent: DEFAULT_ACCURACY_PERCENT,
+            in_rounds: false,
             budget_s: None,
             memory_GiB: 8.0,
             seed: 1,

@@ -20,7 +20,7 @@ use tokio::time::{sleep, timeout};
 use tonic::{Code, Status};
 
 use crate::output::progress::StageProgress;
-use crate::plan::{Estimator, Settings};
+use crate::plan::{DEFAULT_ACCURACY_PERCENT, Estimator, Settings};
 use crate::solution::Solution;
 use results::Arriving;
 
@@ -138,7 +138,9 @@ fn options(settings: &Settings) -> v1::SolveOptions {
             Diameter::Infinite => Some(f64::INFINITY),
             Diameter::Metres(metres) => Some(metres),
         },
-        accuracy_percent: Some(settings.accuracy_percent),
+        // what is asked for is reached in rounds
+        accuracy_percent: Some(settings.accuracy_percent)
+            .filter(|&a| settings.in_rounds || a != DEFAULT_ACCURACY_PERCENT),
         memory_gi_b: Some(settings.memory_GiB),
         seed: Some(settings.seed),
         estimator: estimator.into(),

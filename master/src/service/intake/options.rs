@@ -54,6 +54,7 @@ pub(in crate::service) fn settings(
     Ok(Settings {
         diameter,
         accuracy_percent: above_zero("accuracy_percent", accuracy, default.accuracy_percent)?,
+        in_rounds: accuracy.or(given.budget_s).is_some(),
         budget_s: match given.budget_s {
             Some(_) => Some(above_zero("budget_s", given.budget_s, 0.0)?),
             None => None,
