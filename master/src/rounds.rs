@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use crate::output::errors::ErrorParts;
-use crate::output::progress::{Cancelled, Progress};
+use crate::output::progress::Progress;
 use crate::output::resources::Stopwatch;
 use crate::plan::{Plan, PlanError, Settings};
 use crate::run::{Finished, Means, RunError, solve_with};
@@ -77,7 +77,7 @@ pub enum Ended {
     /// A finer one would have taken longer than allowed.
     OutOfTime,
     /// A finer one would have taken more memory, or more lines, than there may be.
-    OutOfMemory,
+    BeyondLimits,
     /// There have been enough.
     OutOfRounds,
     /// No accuracy was asked for: what the default comes to has to do.
@@ -92,7 +92,7 @@ impl fmt::Display for Accuracy {
         let why = match self.ended {
             Ended::Reached => "",
             Ended::OutOfTime => ", because the time allowed is up",
-            Ended::OutOfMemory => ", because finer plans are beyond the limits",
+            Ended::BeyondLimits => ", because finer plans are beyond the limits",
             Ended::OutOfRounds => ", however fine it was planned",
             Ended::NotAsked => ", which is no more than the default: --accuracy sees to it",
         };
@@ -120,9 +120,6 @@ pub enum RoundsError {
     /// A solve failed.
     #[error(transparent)]
     Run(#[from] RunError),
-    /// It is not wanted any more.
-    #[error(transparent)]
-    Cancelled(#[from] Cancelled),
 }
 
 /// Never more rounds than this.
@@ -146,7 +143,7 @@ pub fn solve_in_rounds(
     loop {
         begins(&plan, &rounds);
         watch.lap("plan");
-        progress.check()?;
+        progress.check().map_err(RunError::from)?;
         let round_begun = Instant::now();
         let finished = solve_with(problem, &plan, means, progress, watch)?;
         let worst = worst(&finished.errors);
@@ -173,7 +170,7 @@ pub fn solve_in_rounds(
         let next = next.and_then(|finer| {
             let plan = Plan::new(problem, &at(settings, finer));
             plan.map(|plan| (finer, plan))
-                .map_err(|_| Ended::OutOfMemory)
+                .map_err(|_| Ended::BeyondLimits)
         });
         match next {
             Ok(next) => (planned, plan) = next,

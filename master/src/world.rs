@@ -135,9 +135,9 @@ impl World {
         }
     }
 
-    /// The part of a row (a face of an element, or a soil cell) that the soil leaves in the open: of what it does
-    /// not cut, all; how deep that lies, its lines tell.
-    pub fn uncut(&self, row: u32) -> f64 {
+    /// The share of a row (a face of an element, or a soil cell) above the soil, where the soil cuts it. Of what it
+    /// does not cut, 1: the lines of a row that lies under the soil tell that it is buried.
+    pub fn share_above_soil(&self, row: u32) -> f64 {
         let element = row / 2;
         let (Some(&t), Some(soil)) = (self.triangle_of_element.get(element as usize), &self.soil)
         else {

@@ -143,7 +143,7 @@ fn without_memory_the_best_that_fits_has_to_do() {
         ..asked(0.1)
     };
     let accuracy = reach(&problem, &settings).accuracy;
-    assert_eq!(accuracy.ended, Ended::OutOfMemory, "{accuracy:?}");
+    assert_eq!(accuracy.ended, Ended::BeyondLimits, "{accuracy:?}");
 }
 
 #[test]

@@ -61,7 +61,7 @@ impl Exchange {
             exposed: seen
                 .par_iter()
                 .enumerate()
-                .map(|(row, seen)| world.uncut(row as u32) * exposed(seen))
+                .map(|(row, seen)| world.share_above_soil(row as u32) * exposed(seen))
                 .collect(),
             to_sky: part(|s| s.sky),
             to_void: part(|s| s.void),

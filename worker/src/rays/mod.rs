@@ -102,17 +102,17 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
     let [a, b, c] = triangle;
     let longest_m = a.distance(*b).max(b.distance(*c)).max(c.distance(*a)) / f64::from(n);
     for local in block.first[t]..block.first[t + 1] {
+        let above = block.above_soil(t, local);
+        let area_m2 = match &above {
+            Above::Part(part) => part.share * block.area_m2[local as usize],
+            Above::Whole | Above::Nothing => block.area_m2[local as usize],
+        };
         for side in 0..2 {
             let face = 2 * local + side;
             let global = block.seen_as[face as usize];
             if !block.has_row(face) {
                 continue;
             }
-            let above = block.above_soil(t, local);
-            let area_m2 = match &above {
-                Above::Part(part) => part.share * block.area_m2[local as usize],
-                Above::Whole | Above::Nothing => block.area_m2[local as usize],
-            };
             let count = plan.rays_of(area_m2, longest_m, global);
             if count == 0 {
                 continue;
