@@ -162,7 +162,7 @@ pub fn solve_with(
     let mut irradiance = Irradiance::default();
     if plan.sampling.is_some() {
         progress.stage("solve", 0);
-        outlook = exchange.outlook(&world);
+        outlook = exchange.outlook(&world, |row| direct.reaches(row));
         let system = System {
             problem,
             world: &world,

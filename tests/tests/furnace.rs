@@ -25,7 +25,7 @@ fn heated(scenery: &Scenery, traced: &Traced, lit: &[usize]) -> Vec<f64> {
         direct[row] = 1.0;
     }
     let fixed = vec![0.0; world.ends.len() - world.rows()];
-    let outlook = exchange.outlook(world);
+    let outlook = exchange.outlook(world, |_| false);
     let tolerance = Tolerance {
         absorbed: 1e-7,
         most_passes: 1000,

@@ -43,6 +43,17 @@ pub struct Direct {
     pub lines: u64,
 }
 
+impl Direct {
+    /// Whether a row is lit in any band: a face or the face behind it, which light passes to, or a cell of soil.
+    pub fn reaches(&self, row: usize) -> bool {
+        let bands = self.incoming_W.len();
+        let faces = 2 * self.element_variance_W2.len() / bands.max(1);
+        let (first, rows) = if row < faces { (row & !1, 2) } else { (row, 1) };
+        let on = &self.irradiance_W_m2[first * bands..(first + rows) * bands];
+        on.iter().any(|&e| e > 0.0)
+    }
+}
+
 /// Sources are worked off in this many groups, each in order, which are then added in order: so the
 /// result does not depend on the number of threads.
 const GROUPS: usize = 8;

@@ -21,11 +21,20 @@ pub struct Outlook {
 }
 
 impl Exchange {
-    /// Counts what is seen by each row.
-    pub fn outlook(&self, world: &World) -> Outlook {
+    /// Counts what is seen by each row; `lit` tells which rows a source shines on.
+    ///
+    /// What is lit is not buried, though all lines of a row that peeps out of the soil by a hair may say so: it
+    /// counts as if one line more had seen the sky.
+    pub fn outlook(&self, world: &World, lit: impl Fn(usize) -> bool + Sync) -> Outlook {
         let seen: Vec<[Seen; 2]> = (0..world.rows())
             .into_par_iter()
-            .map(|row| [0, 1].map(|h: usize| Seen::of(world, self.halves[h].row(row))))
+            .map(|row| {
+                let mut seen = [0, 1].map(|h: usize| Seen::of(world, self.halves[h].row(row)));
+                if seen.iter().all(|s| s.counted == 0) && lit(row) {
+                    (seen[0].counted, seen[0].sky) = (1, 1);
+                }
+                seen
+            })
             .collect();
         let per = |part: usize, of: usize| {
             if of == 0 {
