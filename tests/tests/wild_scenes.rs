@@ -79,6 +79,13 @@ fn a_sliver_along_a_long_and_narrow_scene_is_lit() {
     solved(6028);
 }
 
+/// What the sun lights, though all lines of the exchange take it for buried: clipping at the soil alone does not
+/// tell, and most of the light went nowhere.
+#[test]
+fn what_is_lit_is_not_buried_whatever_its_lines_say() {
+    solved(5_001_216);
+}
+
 /// Two points one above the other and no soil: a lattice of 10^14 lines through a box of no area.
 #[test]
 fn points_alone_take_no_time() {
