@@ -70,6 +70,7 @@ impl Ordered {
                 },
                 bands: problem.bands.iter().map(band).collect(),
                 sources: problem.sources.clone(),
+                sky_directions: problem.sky_directions,
             },
             triangle,
             organ,
@@ -93,7 +94,13 @@ impl Ordered {
             }
             areas
         };
+        let mut organ_bias_W = vec![0.0; solution.organ_bias_W.len()];
+        let bias_W = solution.organ_bias_W.chunks_exact(bands);
+        for (from, &to) in bias_W.zip(&self.organ) {
+            organ_bias_W[to as usize * bands..][..bands].copy_from_slice(from);
+        }
         Solution {
+            organ_bias_W,
             organs: items(&solution.organs, &self.organ),
             triangles: items(&solution.triangles, &self.triangle),
             organ_area_m2: areas(&solution.organ_area_m2, &self.organ),

@@ -33,6 +33,7 @@ impl Parts<'_> {
             organs: vec![ItemLight::default(); scene.organs.len() * bands],
             triangles: vec![ItemLight::default(); scene.triangles.len() * bands],
             organ_area_m2: vec![0.0; scene.organs.len()],
+            organ_bias_W: vec![0.0; scene.organs.len() * bands],
             triangle_area_m2: vec![0.0; scene.triangles.len()],
             ..Solution::default()
         };

@@ -98,16 +98,22 @@ impl fmt::Display for Accuracy {
         };
         write!(
             f,
-            "{:.2} % reached in {}, aimed at {} %{why}; from exchange {:.2}, direct light {:.2}, solver {:.2} %: \
-             {} is the largest",
+            "{:.2} % reached in {}, aimed at {} %{why}; from",
             parts.total_percent(),
             parts.band,
             self.asked_percent,
-            parts.exchange_percent,
-            parts.direct_percent,
-            parts.solver_percent,
-            parts.largest()
-        )
+        )?;
+        let (mut comma, largest) = ("", parts.largest());
+        for (percent, name) in parts.named().into_iter().filter(|part| part.0 > 0.0) {
+            let most = if name == largest {
+                " (the largest)"
+            } else {
+                ""
+            };
+            write!(f, "{comma} {name} {percent:.2}{most}")?;
+            comma = ",";
+        }
+        f.write_str(" %")
     }
 }
 
@@ -251,7 +257,7 @@ mod tests {
             band: "PAR".to_owned(),
             exchange_percent,
             direct_percent,
-            solver_percent: 0.0,
+            ..ErrorParts::default()
         }
     }
 

@@ -12,13 +12,13 @@ use crate::exchange::{
 };
 use crate::far_field::closure::{FarRows, from_layers};
 use crate::order::Ordered;
-use crate::output::errors::{ErrorParts, error_parts};
+use crate::output::errors::{ErrorParts, OrganParts};
 use crate::output::progress::{Cancelled, Progress};
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
 use crate::results::Parts;
 use crate::solution::Solution;
-use crate::solver::{Irradiance, SolveError, System};
+use crate::solver::{FarSample, Irradiance, SolveError, System};
 use crate::store::Store;
 use crate::world::{World, outer_soil_radiosity_W_m2};
 
@@ -172,6 +172,7 @@ pub fn solve_with(
             direct_W_m2: &direct.irradiance_W_m2,
             fixed_W_m2: &meanwhile.fixed_W_m2,
             incoming_W: &direct.incoming_W,
+            far_sample: meanwhile.far_sample.as_ref(),
         };
         irradiance = system.solve(&plan.scattering_bands, &plan.tolerance)?;
         watch.lap("solve");
@@ -186,12 +187,10 @@ pub fn solve_with(
         irradiance: &irradiance,
         scattering: &plan.scattering_bands,
     };
-    let solution = parts.assemble();
-    let left = |band| {
-        let place = plan.scattering_bands.iter().position(|&b| b == band);
-        place.map_or(0.0, |k| irradiance.left[k])
-    };
-    let errors = error_parts(&problem.scene, &solution, &direct.organ_variance_W2, left);
+    let mut solution = parts.assemble();
+    let organs = OrganParts::of(direct, &irradiance, &plan.scattering_bands);
+    let errors = organs.of_scene(&problem.scene, &solution);
+    solution.organ_bias_W = organs.bias_W(&solution);
     let solution = ordered.back(solution);
     check_balance(&solution)?;
     watch.lap("results");
@@ -233,6 +232,7 @@ fn here(
 struct Meanwhile {
     direct: Direct,
     far: Option<FarRows>,
+    far_sample: Option<FarSample>,
     fixed_W_m2: Vec<f64>,
 }
 
@@ -255,22 +255,62 @@ impl Meanwhile {
             direct_light(problem, world, &areas_m2, plan.seed).map_err(ExchangeError::from)?;
         watch.lap("direct light");
         progress.check()?;
-        let (mut far, mut fixed_W_m2) = (None, Vec::new());
-        if plan.sampling.is_some() {
+        let (mut far, mut far_sample, mut fixed_W_m2) = (None, None, Vec::new());
+        if let Some(sampling) = &plan.sampling {
             stage("far field");
             let rows = plan.far_field.map(|f| FarRows::trace(problem, world, &f));
             far = rows.transpose().map_err(ExchangeError::from)?;
             fixed_W_m2 = fixed(problem, world, plan);
+            if far.is_some() {
+                let lit = |row| direct.reaches(row);
+                far_sample = Some(sample_far(problem, world, sampling, lit, progress)?);
+            }
             watch.lap("far field");
             progress.check()?;
         }
         Ok(Self {
             direct,
             far,
+            far_sample,
             fixed_W_m2,
         })
     }
 }
+
+/// The exchange by a few lines, within the sphere and without end: what the far field is judged by.
+fn sample_far(
+    problem: &Problem,
+    world: &World,
+    sampling: &Sampling,
+    lit: impl Fn(usize) -> bool + Sync,
+    progress: &Progress,
+) -> Result<FarSample, ExchangeError> {
+    let by_lines = sampling.sets_per_batch > 0;
+    let few = Sampling {
+        batches: 2,
+        sets_per_batch: sampling.sets_per_batch.min(MOST_FAR_SETS),
+        least_samples: if by_lines { 0.0 } else { FAR_RAYS },
+        ..*sampling
+    };
+    let look = |radius_m: f64| {
+        let world = World {
+            radius_m,
+            ..world.clone()
+        };
+        let whole = [BlockOf::whole(&world)];
+        let seen = trace_here(&problem.scene, &world, &whole, &few, || progress.check())?;
+        let outlook = seen.outlook(&world, &lit);
+        Ok::<_, ExchangeError>((seen, outlook))
+    };
+    Ok(FarSample {
+        within: look(world.radius_m)?,
+        without_end: look(f64::INFINITY)?,
+    })
+}
+
+/// Sets of axes of such a look, at most, and rays from a face where there are no lines.
+const MOST_FAR_SETS: u32 = 8;
+const FAR_RAYS: f64 = 8.0;
 
 /// Radiosities of what is not a row: dark, but for the unshaded soil beyond the map of an open scene and
 /// the far field's start.

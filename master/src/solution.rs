@@ -66,6 +66,9 @@ pub struct Balance {
 pub struct Solution {
     /// Indexed `organ * bands + band`, organs in the scene's order.
     pub organs: Vec<ItemLight>,
+    /// How far `absorbed_W` of each organ may be off besides its standard error: by the size of elements, by
+    /// the directions of a sky, by the mean field beyond a sphere; W, indexed like `organs`.
+    pub organ_bias_W: Vec<f64>,
     /// Indexed `triangle * bands + band`, triangles in the scene's order.
     pub triangles: Vec<ItemLight>,
     /// One-sided area of each organ, m².

@@ -57,6 +57,7 @@ pub fn one_leaf() -> [v1::SceneSlice; 3] {
             soil_albedo: 0.0,
             materials: vec![v1::MaterialOptics::default()],
         }],
+        sky_directions: 0,
         sources: vec![v1::ParallelSource {
             direction_z: -1.0,
             irradiance_w_m2: vec![100.0],

@@ -54,6 +54,7 @@ pub fn problem(
         scene: scene(generated),
         bands: bands.iter().map(band).collect(),
         sources,
+        sky_directions: 0,
     }
 }
 

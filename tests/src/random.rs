@@ -222,5 +222,6 @@ fn lit(dice: &mut Dice, scene: Scene) -> Problem {
         scene,
         bands,
         sources,
+        sky_directions: 0,
     }
 }

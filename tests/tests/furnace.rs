@@ -39,6 +39,7 @@ fn heated(scenery: &Scenery, traced: &Traced, lit: &[usize]) -> Vec<f64> {
         direct_W_m2: &direct,
         fixed_W_m2: &fixed,
         incoming_W: &[1.0],
+        far_sample: None,
     };
     let irradiance = system.solve(&[0], &tolerance).unwrap();
     (0..world.rows())

@@ -225,6 +225,7 @@ fn light_of_two_sources_adds_up() {
     let with = |sources: Vec<_>| {
         let part = Problem {
             sources,
+            sky_directions: 0,
             ..problem.clone()
         };
         solve(&part, &coarse()).solution

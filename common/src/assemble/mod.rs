@@ -100,6 +100,7 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
             scene,
             bands,
             sources,
+            sky_directions: 0,
         },
         inspection,
         sky,

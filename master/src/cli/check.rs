@@ -57,7 +57,7 @@ fn load(inputs: &Inputs) -> Result<Loaded> {
         let accuracy = inputs.options.accuracy_percent;
         let directions = directions_for(accuracy.unwrap_or(default.accuracy_percent));
         let seed = inputs.options.seed.unwrap_or(default.seed);
-        loaded.problem.sources = sky.sources(directions, seed)?;
+        loaded.problem.light_by(sky, directions, seed)?;
     }
     Ok(loaded)
 }

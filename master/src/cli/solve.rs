@@ -276,7 +276,9 @@ impl Task {
         }
         if let Some(sky) = &loaded.sky {
             let directions: NonZeroUsize = directions_for(self.settings.accuracy_percent);
-            loaded.problem.sources = sky.sources(directions, self.settings.seed)?;
+            loaded
+                .problem
+                .light_by(sky, directions, self.settings.seed)?;
         }
         Ok(loaded)
     }

@@ -10,6 +10,7 @@ mod areas;
 mod buffer;
 mod outlines;
 mod probe;
+mod sky;
 mod source;
 
 use nestrad_common::directions::{Purpose, stream};
@@ -41,6 +42,9 @@ pub struct Direct {
     pub passed_W: Vec<f64>,
     /// Lattice points that were drawn.
     pub lines: u64,
+    /// What every other direction of a sky, and the others, would make organs absorb if they stood for all of
+    /// it, W, indexed `organ * bands + band`; empty without such a sky.
+    pub sky_halves_W: [Vec<f64>; 2],
 }
 
 impl Direct {
@@ -54,7 +58,7 @@ impl Direct {
     }
 }
 
-/// Sources are worked off in this many groups, each in order, which are then added in order: so the
+/// Sources are worked off in this many groups, an even number, each in order, which are then added in order: so the
 /// result does not depend on the number of threads.
 const GROUPS: usize = 8;
 
@@ -67,13 +71,12 @@ pub fn direct_light(
 ) -> Result<Direct, BlockFault> {
     let areas = Areas::of(problem);
     let probe = Probe::new(problem, world, &areas, line_area_m2, seed)?;
-    let numbered: Vec<usize> = (0..problem.sources.len()).collect();
-    let parts: Vec<Direct> = (0..GROUPS.min(numbered.len()))
+    let parts: Vec<Direct> = groups(problem)
         .into_par_iter()
         .map(|group| {
             let mut part = empty(problem, world);
             let mut scratch = source::Scratch::new(world, problem.scene.organs.len());
-            for &k in numbered.iter().skip(group).step_by(GROUPS) {
+            for k in group {
                 let mut rng = stream(seed, Purpose::Direct, k as u64);
                 let random = [rng.random(), rng.random(), 0.5];
                 let drawn = source::Drawn {
@@ -106,7 +109,17 @@ pub fn direct_light(
         add(&mut sum.passed_W, &part.passed_W);
         sum.lines += part.lines;
     }
+    sum.sky_halves_W = sky::halves_W(problem, world, &parts);
     Ok(sum)
+}
+
+/// The numbers of the sources of each group: those of a sky's directions apart from the others.
+fn groups(problem: &Problem) -> Vec<Vec<usize>> {
+    let (sky, all) = (problem.sky_directions, problem.sources.len());
+    let dealt = |from: usize, to: usize| {
+        (0..GROUPS.min(to - from)).map(move |g| (from + g..to).step_by(GROUPS).collect())
+    };
+    dealt(0, sky).chain(dealt(sky, all)).collect()
 }
 
 fn empty(problem: &Problem, world: &World) -> Direct {
@@ -119,6 +132,7 @@ fn empty(problem: &Problem, world: &World) -> Direct {
         closure_variance_W2: vec![0.0; bands],
         passed_W: vec![0.0; bands],
         lines: 0,
+        sky_halves_W: Default::default(),
     }
 }
 

@@ -27,6 +27,7 @@ pub(crate) fn organs<'a>(scene: &'a Scene, bands: &'a [&str], solution: &'a Solu
             Column::quantity("absorbed_W", move |row| light(row).absorbed_W),
             Column::quantity("absorbed_direct_W", move |row| light(row).absorbed_direct_W),
             Column::quantity("absorbed_se_W", move |row| light(row).absorbed_se_W),
+            Column::quantity("absorbed_bias_W", move |row| solution.organ_bias_W[row]),
         ],
     }
 }

@@ -49,6 +49,7 @@ fn solution() -> Solution {
     Solution {
         organs: vec![ItemLight::default(), light(0.0), light(1.0), light(0.1)],
         triangles: vec![light(1.0), light(0.1), light(1.0), light(1.0)],
+        organ_bias_W: vec![0.0, 0.0, 0.25, 0.0],
         organ_area_m2: vec![0.0, 0.625],
         triangle_area_m2: vec![0.625, 0.0],
         soil: Some(SoilMap {

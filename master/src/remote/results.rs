@@ -34,6 +34,10 @@ impl<'a> Arriving<'a> {
         match slice.part {
             Some(Part::Organs(slice)) => {
                 let solution = &mut self.solution;
+                if slice.absorbed_bias_w.len() != slice.area_m2.len() * self.problem.bands.len() {
+                    return Err(RemoteError::Answer("organs that do not fit the scene"));
+                }
+                solution.organ_bias_W.extend(slice.absorbed_bias_w);
                 append(
                     "organs",
                     (slice.first, self.problem.scene.organs.len()),

@@ -62,6 +62,7 @@ fn header(problem: &Problem, geometry: Geometry) -> v1::SceneSlice {
         geometry: Some(geometry),
         bands: bands.collect(),
         sources: sources.collect(),
+        sky_directions: problem.sky_directions as u32,
     };
     v1::SceneSlice {
         part: Some(Part::Header(header)),

@@ -92,7 +92,11 @@ impl GeometryHasher {
 }
 
 /// Names a scene: a geometry under a light, with its optics.
-pub(super) fn scene_id(geometry: Id, bands: &[Band], sources: &[Source]) -> Id {
+pub(super) fn scene_id(
+    geometry: Id,
+    bands: &[Band],
+    (sources, sky_directions): (&[Source], usize),
+) -> Id {
     let mut words = Words::new("nestrad scene 1");
     words.0.update(&geometry.0);
     words.count(bands.len());
@@ -105,6 +109,7 @@ pub(super) fn scene_id(geometry: Id, bands: &[Band], sources: &[Source]) -> Id {
         }
     }
     words.count(sources.len());
+    words.count(sky_directions);
     for source in sources {
         words.numbers(&source.direction.to_array());
         words.numbers(&source.irradiance_W_m2);

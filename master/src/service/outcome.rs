@@ -96,7 +96,7 @@ impl Outcome {
 fn bytes(triangles: usize, organs: usize, cells: usize, bands: usize) -> u64 {
     let light = bands * size_of::<ItemLight>();
     let of_triangles = triangles * (light + 12);
-    let of_organs = organs * (light + 8 + size_of::<Organ>());
+    let of_organs = organs * (light + 8 * (bands + 1) + size_of::<Organ>());
     (of_triangles + of_organs + cells * bands * size_of::<Estimate>() + (4 << 10)) as u64
 }
 

@@ -68,11 +68,12 @@ impl SolveService for Rpc {
             let message = "the first slice: expected a header, found something else";
             return Err(ServiceError::new(ErrorCode::Invalid, message).into());
         };
+        let lights = (&header.sources[..], header.sky_directions);
         let (geometry, light) = match &header.geometry {
             Some(Geometry::NewGeometry(new)) => {
                 let upload = Upload::begin(new)?;
                 // what is wrong with the light should not wait for a canopy to arrive
-                let light = light(&header.bands, &header.sources, upload.materials())?;
+                let light = light(&header.bands, lights, upload.materials())?;
                 (self.receive(upload, &mut slices).await?, light)
             }
             Some(Geometry::GeometryId(id)) => {
@@ -82,7 +83,7 @@ impl SolveService for Rpc {
                 }
                 let id = parse(id, "geometry_id")?;
                 let materials = self.scenes.materials(id)?;
-                (id, light(&header.bands, &header.sources, &materials)?)
+                (id, light(&header.bands, lights, &materials)?)
             }
             None => {
                 let message = "header: expected new_geometry or geometry_id, found neither";

@@ -57,6 +57,7 @@ impl HeldScene {
             scene: self.geometry().scene.clone(),
             bands: self.light().bands.clone(),
             sources: self.light().sources.clone(),
+            sky_directions: self.light().sky_directions,
         }
     }
 }
@@ -136,7 +137,11 @@ impl Scenes {
         let memory = self.reserve(SCENE_BYTES + light.bytes())?;
         let mut held = self.lock();
         let scene = HeldScene {
-            id: scene_id(geometry, &light.bands, &light.sources),
+            id: scene_id(
+                geometry,
+                &light.bands,
+                (&light.sources, light.sky_directions),
+            ),
             geometry: held.geometry(geometry)?,
             light: Arc::new(Counted {
                 item: light,
@@ -242,6 +247,7 @@ mod tests {
         let light = Light {
             bands: Vec::new(),
             sources: Vec::new(),
+            sky_directions: 0,
         };
         scenes.keep_scene(id, light)
     }

@@ -63,7 +63,7 @@ fn parts(items: usize, item_bytes: usize) -> impl Iterator<Item = (usize, usize)
 fn end_of_organs(outcome: &Outcome, from: usize) -> usize {
     let mut bytes = 0;
     let fits = |organ: &&nestrad_common::scene::Organ| {
-        bytes += LIGHT_BYTES * outcome.bands.len() + 16 + organ.id.len() + organ.plant.len();
+        bytes += (LIGHT_BYTES + 8) * outcome.bands.len() + 16 + organ.id.len() + organ.plant.len();
         bytes <= SLICE_BYTES
     };
     let rest = &outcome.organs[from..];
@@ -80,6 +80,7 @@ fn organs(outcome: &Outcome, from: usize, to: usize) -> v1::OrganLight {
         plant: organs.iter().map(|organ| organ.plant.clone()).collect(),
         area_m2: outcome.solution.organ_area_m2[from..to].to_vec(),
         light: light(&outcome.solution.organs[from * bands..to * bands]),
+        absorbed_bias_w: outcome.solution.organ_bias_W[from * bands..to * bands].to_vec(),
     }
 }
 

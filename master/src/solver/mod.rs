@@ -14,7 +14,9 @@
 //! result for any number of threads. Passes are accelerated by a minimal-residual method (`krylov`), so
 //! that a canopy that absorbs next to nothing converges, too.
 
+mod deviation;
 mod gather;
+mod groups;
 mod krylov;
 mod lane;
 mod pass;
@@ -27,7 +29,9 @@ use thiserror::Error;
 use crate::exchange::{Exchange, Outlook};
 use crate::far_field::closure::FarRows;
 use crate::world::World;
+pub use deviation::{Deviation, FarSample};
 use gather::Gather;
+use groups::Groups;
 use krylov::{Descent, difference};
 use lane::PULLED_TOGETHER;
 use pass::Pass;
@@ -81,6 +85,10 @@ pub struct Irradiance {
     pub left: Vec<f64>,
     /// What the sampling of the exchange leaves uncertain, per band.
     pub variances: Vec<Variances>,
+    /// What the size of elements may do, per band.
+    pub of_element_size: Vec<Deviation>,
+    /// What the mean field beyond the sphere does, per band, where there is one.
+    pub of_far_field: Vec<Deviation>,
 }
 
 impl Irradiance {
@@ -111,6 +119,8 @@ pub struct System<'a> {
     pub fixed_W_m2: &'a [f64],
     /// Incoming power of all bands, W: what tolerances are relative to.
     pub incoming_W: &'a [f64],
+    /// What the far field is judged by, where there is one.
+    pub far_sample: Option<&'a FarSample>,
 }
 
 impl System<'_> {
@@ -125,13 +135,17 @@ impl System<'_> {
             passes: 0,
             left: vec![0.0; bands.len()],
             variances: vec![Variances::default(); bands.len()],
+            of_element_size: Vec::new(),
+            of_far_field: Vec::new(),
         };
+        let groups = Groups::of(self.problem, self.world);
         let mut done = 0;
         while done < bands.len() {
             let group = Group {
                 system: *self,
                 bands: &bands[done..(done + WIDEST).min(bands.len())],
                 tolerance,
+                groups: &groups,
             };
             match group.bands.len() {
                 1 => group.solve::<1>(done, &mut all)?,
@@ -152,6 +166,7 @@ struct Group<'a> {
     system: System<'a>,
     bands: &'a [usize],
     tolerance: &'a Tolerance,
+    groups: &'a Groups,
 }
 
 impl Group<'_> {
@@ -173,6 +188,11 @@ impl Group<'_> {
         }
         all.passes = all.passes.max(pass.done);
         self.take(&pass, first, all);
+        all.of_element_size
+            .extend(pass.of_element_size(self, self.groups));
+        if let Some(sample) = self.system.far_sample {
+            all.of_far_field.extend(pass.of_far_field(self, sample));
+        }
         let mut way = Way::default();
         for pair in (0..self.bands.len()).step_by(PULLED_TOGETHER) {
             let bands = &self.bands[pair..(pair + PULLED_TOGETHER).min(self.bands.len())];

@@ -23,6 +23,7 @@ const MAX_SOURCES: usize = 65_536;
 pub(in crate::service) struct Light {
     pub(in crate::service) bands: Vec<Band>,
     pub(in crate::service) sources: Vec<Source>,
+    pub(in crate::service) sky_directions: usize,
 }
 
 impl Light {
@@ -37,7 +38,7 @@ impl Light {
 /// Optics and sources for a scene of these materials.
 pub(in crate::service) fn light(
     bands: &[v1::BandOptics],
-    sources: &[v1::ParallelSource],
+    (sources, sky_directions): (&[v1::ParallelSource], u32),
     materials: &[Material],
 ) -> Result<Light, ServiceError> {
     let length = |list: &str, found: usize, least: usize, most: usize| {
@@ -48,6 +49,7 @@ pub(in crate::service) fn light(
     };
     length("bands", bands.len(), 1, MAX_BANDS)?;
     length("sources", sources.len(), 0, MAX_SOURCES)?;
+    length("sky_directions", sky_directions as usize, 0, sources.len())?;
     let mut names = HashSet::new();
     let mut checked = Vec::with_capacity(bands.len());
     for (b, band) in bands.iter().enumerate() {
@@ -64,6 +66,7 @@ pub(in crate::service) fn light(
     Ok(Light {
         bands: checked,
         sources: sources.collect::<Result<_, _>>()?,
+        sky_directions: sky_directions as usize,
     })
 }
 

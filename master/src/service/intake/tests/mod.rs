@@ -269,7 +269,7 @@ const MATERIALS: [Material; 2] = [Material::Leaf { species: 1 }, Material::Stem 
 
 #[test]
 fn directions_become_unit_vectors_once() {
-    let first = light(&[band("PAR")], &[sun()], &MATERIALS).unwrap();
+    let first = light(&[band("PAR")], (&[sun()], 0), &MATERIALS).unwrap();
     let direction = first.sources[0].direction;
     assert!(direction.abs_diff_eq(DVec3::new(0.6, 0.0, -0.8), 1e-15));
     for k in 0..1000 {
@@ -280,7 +280,7 @@ fn directions_become_unit_vectors_once() {
             direction_z: turned.z,
             ..sun()
         };
-        let light = light(&[band("PAR")], &[given], &MATERIALS).unwrap();
+        let light = light(&[band("PAR")], (&[given], 0), &MATERIALS).unwrap();
         assert_eq!(light.sources[0].direction, turned);
     }
 }
@@ -290,7 +290,7 @@ fn light_that_cannot_be_is_refused() {
     let with = |change: fn(&mut Vec<v1::BandOptics>, &mut v1::ParallelSource)| {
         let (mut bands, mut source) = (vec![band("PAR")], sun());
         change(&mut bands, &mut source);
-        refusal(light(&bands, &[source], &MATERIALS))
+        refusal(light(&bands, (&[source], 0), &MATERIALS))
     };
     for (message, said) in [
         (with(|b, _| b.clear()), "bands: expected 1 to 256, found 0"),

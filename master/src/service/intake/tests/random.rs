@@ -14,7 +14,11 @@ fn take_in(slices: Vec<v1::SceneSlice>) {
     for part in slices.into_iter().filter_map(|slice| slice.part) {
         let fits = match (part, &mut upload) {
             (Part::Header(header), _) => {
-                let _ = light(&header.bands, &header.sources, &MATERIALS);
+                let _ = light(
+                    &header.bands,
+                    (&header.sources, header.sky_directions),
+                    &MATERIALS,
+                );
                 if let Some(Geometry::NewGeometry(new)) = &header.geometry {
                     upload = Upload::begin(new).ok();
                 }
