@@ -17,7 +17,7 @@ use nestrad_tests::solving::{plan, solve};
 fn reach(problem: &Problem, settings: &Settings) -> Reached {
     let (means, progress) = (Means::default(), Progress::new(true));
     let watch = &mut Stopwatch::start();
-    solve_in_rounds(problem, settings, means, &progress, watch, |_, _| ()).unwrap()
+    solve_in_rounds(problem, None, settings, means, &progress, watch, |_, _| ()).unwrap()
 }
 
 fn asked(accuracy_percent: f64) -> Settings {
@@ -117,8 +117,8 @@ fn a_round_that_misses_is_followed_by_a_finer_one() {
     let accuracy = &reached.accuracy;
     assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
     assert!(accuracy.rounds.len() > 1, "{accuracy:?}");
-    let planned: Vec<f64> = accuracy.rounds.iter().map(|r| r.planned_percent).collect();
-    assert!(planned.is_sorted_by(|a, b| a > b), "{accuracy:?}");
+    let reached: Vec<_> = accuracy.rounds.iter().map(|r| r.reached_percent).collect();
+    assert!(reached.is_sorted_by(|a, b| a > b), "{accuracy:?}");
 }
 
 #[test]

@@ -5,11 +5,10 @@ use clap::Args;
 use nestrad_common::assemble::{self, Loaded};
 use nestrad_common::inputs::Inputs;
 use nestrad_common::inspection::Inspection;
-use nestrad_common::light::sky::directions_for;
 use nestrad_common::optics::FaceOptics;
 use nestrad_common::options::Options;
 use nestrad_common::problem::Problem;
-use nestrad_master::plan::Settings;
+use nestrad_master::plan::{Aims, Settings};
 
 use super::console;
 use super::flags::SceneFlags;
@@ -55,7 +54,8 @@ fn load(inputs: &Inputs) -> Result<Loaded> {
     if let Some(sky) = &loaded.sky {
         let default = Settings::default();
         let accuracy = inputs.options.accuracy_percent;
-        let directions = directions_for(accuracy.unwrap_or(default.accuracy_percent));
+        let accuracy_percent = accuracy.unwrap_or(default.accuracy_percent);
+        let directions = Aims::of(accuracy_percent).sky_directions();
         let seed = inputs.options.seed.unwrap_or(default.seed);
         loaded.problem.light_by(sky, directions, seed)?;
     }

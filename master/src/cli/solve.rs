@@ -1,6 +1,5 @@
 //! `nestrad solve`: files in, light per leaf out.
 
-use std::num::NonZeroUsize;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -10,7 +9,7 @@ use clap::{Args, ValueEnum};
 use nestrad_common::assemble::{self, Loaded};
 use nestrad_common::inputs::Inputs;
 use nestrad_common::inspection::Inspection;
-use nestrad_common::light::sky::directions_for;
+use nestrad_common::light::SkyLight;
 use nestrad_common::options::{self, Diameter, Options};
 use nestrad_common::problem::Problem;
 use nestrad_master::exchange::{JobCounts, Traced};
@@ -18,7 +17,7 @@ use nestrad_master::output::progress::Progress;
 use nestrad_master::output::resources::{Stage, Stopwatch, Usage};
 use nestrad_master::output::summary::Summary;
 use nestrad_master::output::{self, Formats, TableFormat, terminal};
-use nestrad_master::plan::{Estimator, Plan, Settings};
+use nestrad_master::plan::{Aims, Estimator, Plan, Settings};
 use nestrad_master::remote::Remote;
 use nestrad_master::rounds::{Accuracy, Round, solve_in_rounds};
 use nestrad_master::run::{Counters, Means};
@@ -73,8 +72,8 @@ struct HowFlags {
     ///
     /// It sets how many lines are traced. Where it is given and a round misses it in some band, a finer one
     /// follows; the default is one round, whatever it reaches.
-    /// It also sets how many directions a built-in sky has (476 at 0.5 %, 200 at 1 %, 85 at 2 %; 4000 at
-    /// most).
+    /// It also sets how many directions a built-in sky begins with (1132 at 0.5 %, 476 at 1 %, 200 at 2 %; 4000
+    /// at most).
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     accuracy: Option<f64>,
 
@@ -198,6 +197,8 @@ struct Computed {
     counters: Counters,
     stages: Vec<Stage>,
     usage: Usage,
+    /// Sources that the scene was lit by.
+    sources: usize,
 }
 
 impl Task {
@@ -208,21 +209,26 @@ impl Task {
         output::check_writable(&self.out)?;
         watch.lap("input");
 
-        let problem = Arc::new(loaded.problem);
+        let (problem, sky) = (Arc::new(loaded.problem), loaded.sky);
         let computed = match &self.place.master {
-            None => self.compute(&problem, &mut watch)?,
+            None => self.compute(&problem, sky.as_ref(), &mut watch)?,
             Some(url) => {
                 let remote = self
                     .place
                     .solve(url, problem.clone(), &self.settings, self.notes)?;
                 watch.lap("at the master");
-                elsewhere(remote)?
+                elsewhere(remote, problem.sources.len())?
             }
         };
         self.write(&problem, &loaded.inspection, computed, watch)
     }
 
-    fn compute(&self, problem: &Problem, watch: &mut Stopwatch) -> Result<Computed> {
+    fn compute(
+        &self,
+        problem: &Problem,
+        sky: Option<&SkyLight>,
+        watch: &mut Stopwatch,
+    ) -> Result<Computed> {
         let begins = |plan: &Plan, before: &[Round]| self.begins(plan, before);
         let progress = Progress::new(self.notes.quiet);
         let kept = self.state.open()?;
@@ -232,7 +238,7 @@ impl Task {
             kept: kept.as_ref(),
         };
         let settings = &self.settings;
-        let reached = solve_in_rounds(problem, settings, means, &progress, watch, begins)?;
+        let reached = solve_in_rounds(problem, sky, settings, means, &progress, watch, begins)?;
         drop(crew);
         if let Some(kept) = kept {
             kept.close();
@@ -247,20 +253,16 @@ impl Task {
             counters: reached.finished.counters,
             stages: Vec::new(),
             usage: Usage::default(),
+            sources: reached.sources,
         })
     }
 
     /// Says what the next round does.
     fn begins(&self, plan: &Plan, before: &[Round]) {
-        if let Some(Round {
-            planned_percent,
-            reached_percent: Some(reached),
-        }) = before.last()
-        {
+        let reached = before.last().and_then(|round| round.reached_percent);
+        if let Some(reached) = reached {
             let round = before.len();
-            let line = format!(
-                "round {round}, planned for {planned_percent:.3} %, reached {reached:.3} %"
-            );
+            let line = format!("round {round} reached {reached:.3} %");
             self.notes.say("accuracy", &line);
         }
         for line in &plan.reasons {
@@ -275,7 +277,7 @@ impl Task {
             self.notes.say("warning", warning);
         }
         if let Some(sky) = &loaded.sky {
-            let directions: NonZeroUsize = directions_for(self.settings.accuracy_percent);
+            let directions = Aims::of(self.settings.accuracy_percent).sky_directions();
             loaded
                 .problem
                 .light_by(sky, directions, self.settings.seed)?;
@@ -301,11 +303,10 @@ impl Task {
             cpu_s: here.cpu_s + computed.usage.cpu_s,
             peak_memory_bytes: here.peak_memory_bytes.max(computed.usage.peak_memory_bytes),
         };
-        let sources = problem.sources.len();
         let master = self.place.master.as_deref();
         staged.commit(&Summary {
             version: env!("CARGO_PKG_VERSION"),
-            options: &Record::new(&self.inputs, &self.settings, sources, master),
+            options: &Record::new(&self.inputs, &self.settings, computed.sources, master),
             scene: inspection,
             plan: &computed.plan,
             energy_balance: &solution.balance,
@@ -347,7 +348,7 @@ impl Task {
 }
 
 /// What a master computed. Its stages come before those of this process.
-fn elsewhere(remote: Remote) -> Result<Computed> {
+fn elsewhere(remote: Remote, sources: usize) -> Result<Computed> {
     let Remote { solution, summary } = remote;
     let plan: serde_json::Value =
         serde_json::from_str(&summary.plan_json).context("the master's plan cannot be read")?;
@@ -380,5 +381,6 @@ fn elsewhere(remote: Remote) -> Result<Computed> {
             cpu_s: summary.cpu_s,
             peak_memory_bytes: Some(summary.peak_memory_bytes).filter(|&bytes| bytes > 0),
         },
+        sources,
     })
 }

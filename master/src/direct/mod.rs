@@ -154,6 +154,7 @@ pub fn spread_effort(
         .map(|s| s.irradiance_W_m2.iter().sum::<f64>() / -s.direction.z)
         .collect();
     let strongest = intensity.iter().copied().fold(0.0, f64::max);
+    let finest_m2 = finest_m2 * coarser_by_number(&intensity[..problem.sky_directions]);
     let wanted: Vec<f64> = problem
         .sources
         .iter()
@@ -172,6 +173,22 @@ pub fn spread_effort(
     let too_many = (all / MOST_POINTS).max(1.0);
     wanted.iter().map(|area| area * too_many).collect()
 }
+
+/// The many directions of a sky have lattices of their own, whose errors cancel: n of one intensity err as one
+/// source of all their light does whose lines have `n^(-2/3)` of their cross-section (by the same law).
+fn coarser_by_number(sky: &[f64]) -> f64 {
+    let (sum, squares) = sky.iter().fold((0.0, 0.0), |(s, q), i| (s + i, q + i * i));
+    if squares == 0.0 {
+        return 1.0;
+    }
+    // the pitch was measured with a sun that outshines its sky
+    (sum * sum / squares / 2.0)
+        .powf(2.0 / 3.0)
+        .clamp(1.0, COARSEST_OF_MANY)
+}
+
+/// No sky is drawn coarser than this many times a single source, however many directions it has.
+const COARSEST_OF_MANY: f64 = 16.0;
 
 /// No source is drawn with more points than this many times those that the strongest has on the ground.
 const MOST_TIMES: f64 = 8.0;

@@ -5,7 +5,7 @@ use nestrad_common::geometry;
 use nestrad_common::lattice::DEPTH_OF_TOP;
 use nestrad_common::problem::Problem;
 
-use super::{PlanError, Scale, Settings};
+use super::{PlanError, Scale};
 
 /// The accuracy below which the number of directions would pass a million, percent.
 const LEAST_ACCURACY_PERCENT: f64 = 0.01;
@@ -22,8 +22,8 @@ const FINEST_STEP: f64 = 1e-3;
 /// Elements have two faces, and faces and soil cells are numbered with 32 bits.
 const MOST_ELEMENTS: u64 = 1 << 30;
 
-pub(super) fn check_accuracy(settings: &Settings) -> Result<(), PlanError> {
-    let (least, found) = (LEAST_ACCURACY_PERCENT, settings.accuracy_percent);
+pub(super) fn check_accuracy(found: f64) -> Result<(), PlanError> {
+    let least = LEAST_ACCURACY_PERCENT;
     if found >= least {
         Ok(())
     } else {

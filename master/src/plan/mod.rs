@@ -1,6 +1,7 @@
 //! The plan: what a scene needs, decided before anything is computed. What is not needed costs
 //! nothing.
 
+mod aims;
 mod limits;
 mod memory;
 mod reasons;
@@ -19,6 +20,7 @@ use crate::exchange::Sampling;
 use crate::far_field::closure::Resolution;
 use crate::solver::{HALF_BATCHES, Tolerance};
 use crate::world::{World, extent_of};
+pub use aims::Aims;
 pub use memory::Memory;
 pub use scale::Scale;
 
@@ -72,6 +74,8 @@ pub const DEFAULT_ACCURACY_PERCENT: f64 = 0.5;
 /// What will be done, and why.
 #[derive(Clone, Debug, Serialize)]
 pub struct Plan {
+    /// What its parts are to err by.
+    pub aims: Aims,
     /// The scene's sizes.
     pub scale: Scale,
     /// Longest edge of an element, metres.
@@ -182,9 +186,14 @@ impl fmt::Display for Short {
 }
 
 impl Plan {
-    /// Decides what a problem needs.
+    /// Decides what a problem needs for the accuracy of the settings.
     pub fn new(problem: &Problem, settings: &Settings) -> Result<Self, PlanError> {
-        limits::check_accuracy(settings)?;
+        Self::aimed(problem, settings, &Aims::of(settings.accuracy_percent))
+    }
+
+    /// The same with an error to aim at for each part, in place of the accuracy.
+    pub fn aimed(problem: &Problem, settings: &Settings, aims: &Aims) -> Result<Self, PlanError> {
+        limits::check_accuracy(aims.exchange_percent.min(aims.direct_percent))?;
         limits::check_overhang(problem)?;
         let scale = Scale::of(problem);
         limits::check_height(&scale)?;
@@ -194,7 +203,8 @@ impl Plan {
         let scattering_bands: Vec<usize> = (0..problem.bands.len())
             .filter(|&b| lit(b) && !problem.bands[b].is_black(has_soil))
             .collect();
-        let sampling = (!scattering_bands.is_empty()).then(|| sampling(problem, &scale, settings));
+        let sampling =
+            (!scattering_bands.is_empty()).then(|| sampling(problem, &scale, settings, aims));
         // an open scene has no layers that go on for ever; its exchange is full
         let radius_m = match settings.diameter {
             Diameter::Metres(d) if problem.scene.pattern.is_some() => Some(0.5 * d),
@@ -203,16 +213,17 @@ impl Plan {
         // a sphere longer than every line of sight is no bound
         let radius_m =
             radius_m.filter(|&r| sampling.is_some_and(|s| r < s.longest_sight_m(scale.height_m)));
-        let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
+        let finer = aims.exchange_percent / DEFAULT_ACCURACY_PERCENT;
+        let of_direct = aims.direct_percent / DEFAULT_ACCURACY_PERCENT;
         let organ_m = match scale.organ_area_m2 {
             0.0 => f64::INFINITY,
             area => area.sqrt(),
         };
-        let max_edge_m = (organ_m / 6.0)
+        let max_edge_m = (EDGE * organ_m)
             .min((scale.ground_area_m2 / 1000.0).sqrt())
             .max(f64::MIN_POSITIVE)
             .min(radius_m.map_or(f64::INFINITY, |r| r.max(organ_m / FINEST_CUT)))
-            * finer.sqrt().clamp(0.2, 1.0);
+            * (aims.elements_percent / DEFAULT_ACCURACY_PERCENT).clamp(0.05, 4.0);
         let soil_cell_m = (0.2 * organ_m).clamp(
             (scale.ground_area_m2 / MOST_SOIL_CELLS).sqrt(),
             (scale.ground_area_m2 / LEAST_SOIL_CELLS)
@@ -221,20 +232,21 @@ impl Plan {
         );
         limits::check_elements(problem, max_edge_m)?;
         // points on the outline of an organ: see `spread_effort`
-        let direct_line_area_m2 = (scale.organ_area_m2 / 11_000.0 * finer.powf(4.0 / 3.0))
+        let direct_line_area_m2 = (scale.organ_area_m2 / 11_000.0 * of_direct.powf(4.0 / 3.0))
             .min(scale.triangle_area_m2 / 4.0)
             .min(max_edge_m * max_edge_m / EDGE_SQUARED_IN_POINTS)
             .clamp(
-                scale.ground_area_m2 / most_points(problem, finer),
+                scale.ground_area_m2 / most_points(problem, of_direct),
                 scale.ground_area_m2 / 1e4,
             )
             .max(f64::MIN_POSITIVE);
         let mut plan = Self {
+            aims: *aims,
             scale,
             max_edge_m,
             soil_cell_m,
             radius_m,
-            far_field: radius_m.map(|_| far_field(settings)),
+            far_field: radius_m.map(|_| far_field(settings, finer)),
             sampling,
             direct_line_area_m2,
             seed: settings.seed,
@@ -279,6 +291,13 @@ impl Plan {
     }
 }
 
+/// Longest edge of an element, in sides of an organ of average size. Errors go in proportion to it (measured: see
+/// `master/docs/accuracy.md`).
+const EDGE: f64 = 0.7 / 6.0;
+
+/// Planning for less than this makes the exchange no coarser: a batch has a set of axes at least.
+pub(crate) const COARSEST_EXCHANGE_PERCENT: f64 = 0.7;
+
 /// An organ of average size is not cut finer than into this many along a side, however small the sphere.
 const FINEST_CUT: f64 = 24.0;
 
@@ -311,8 +330,8 @@ const LINES_PER_TRIANGLE: f64 = 3.0;
 /// The error of an organ falls with the root of the number of directions; lines beyond some 75 per
 /// organ and direction hardly help (both measured: see `master/docs/accuracy.md`). 16 batches of 2
 /// sets of 16 axes give 0.3 to 0.45 % in NIR.
-fn sampling(problem: &Problem, scale: &Scale, settings: &Settings) -> Sampling {
-    let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
+fn sampling(problem: &Problem, scale: &Scale, settings: &Settings, aims: &Aims) -> Sampling {
+    let finer = aims.exchange_percent / DEFAULT_ACCURACY_PERCENT;
     let (sets_per_batch, least_samples) = match settings.estimator {
         Estimator::Lines => ((2.0 / (finer * finer)).round().max(1.0) as u32, 4.0),
         Estimator::Rays => (0, (RAYS / (finer * finer)).round().clamp(8.0, 1e6)),
@@ -338,8 +357,7 @@ fn sampling(problem: &Problem, scale: &Scale, settings: &Settings) -> Sampling {
 /// Rays from each face in each half, at the default accuracy.
 const RAYS: f64 = 64.0;
 
-fn far_field(settings: &Settings) -> Resolution {
-    let finer = settings.accuracy_percent / DEFAULT_ACCURACY_PERCENT;
+fn far_field(settings: &Settings, finer: f64) -> Resolution {
     let more = 1.0 / (finer * finer);
     Resolution {
         levels: 65,

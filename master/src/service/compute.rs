@@ -91,7 +91,8 @@ fn outcome(job: &Job, means: Means, scene: &HeldScene) -> Result<Outcome, Fault>
     let problem = scene.problem();
     let (settings, progress) = (&job.settings, &job.progress);
     let begins = |plan: &Plan, _: &[Round]| job.set_plan(&plan.reasons);
-    let reached = solve_in_rounds(&problem, settings, means, progress, &mut watch, begins)?;
+    let watch = &mut watch;
+    let reached = solve_in_rounds(&problem, None, settings, means, progress, watch, begins)?;
     let usage = watch.usage();
     Ok(Outcome::new(scene, reached, watch.stages(), usage)?)
 }

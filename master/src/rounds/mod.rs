@@ -1,12 +1,15 @@
 //! Solves in rounds until the error that was asked for is reached.
 //!
-//! The first round is planned for what was asked, and is the only one where nothing was. Where its own standard errors say that it missed, or where
-//! time is short, the next is planned by what the last one measured: its error is taken to fall in proportion
-//! to the accuracy that is planned for, and its cost to rise with the square.
+//! The first round is planned for what was asked, and is the only one where nothing was. Where its own errors say
+//! that it missed, or where time is short, the next is planned by what the last one measured ([`next`]).
 
+mod next;
+
+use std::borrow::Cow;
 use std::fmt;
 use std::time::Instant;
 
+use nestrad_common::light::SkyLight;
 use nestrad_common::problem::Problem;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
@@ -14,8 +17,9 @@ use thiserror::Error;
 use crate::output::errors::ErrorParts;
 use crate::output::progress::Progress;
 use crate::output::resources::Stopwatch;
-use crate::plan::{Plan, PlanError, Settings};
+use crate::plan::{Aims, Plan, PlanError, Settings};
 use crate::run::{Finished, Means, RunError, solve_with};
+use next::Measured;
 
 /// The last round, and how it came to it.
 #[derive(Clone, Debug)]
@@ -24,6 +28,8 @@ pub struct Reached {
     pub plan: Plan,
     /// Its results.
     pub finished: Finished,
+    /// Sources that it was lit by.
+    pub sources: usize,
     /// What was asked for, and what came of it.
     pub accuracy: Accuracy,
 }
@@ -62,8 +68,8 @@ pub struct Accuracy {
 /// A round.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Round {
-    /// Accuracy that it was planned for.
-    pub planned_percent: f64,
+    /// What its parts were planned for.
+    pub planned: Aims,
     /// Error of its worst band, by its own account; none where nothing is absorbed.
     pub reached_percent: Option<f64>,
 }
@@ -80,6 +86,11 @@ pub enum Ended {
     BeyondLimits,
     /// There have been enough.
     OutOfRounds,
+    /// What is left cannot be planned for: the mean field beyond the sphere, or the directions of a sky that were
+    /// given.
+    NoFiner,
+    /// A finer one failed.
+    Failed,
     /// No accuracy was asked for: what the default comes to has to do.
     NotAsked,
 }
@@ -94,6 +105,8 @@ impl fmt::Display for Accuracy {
             Ended::OutOfTime => ", because the time allowed is up",
             Ended::BeyondLimits => ", because finer plans are beyond the limits",
             Ended::OutOfRounds => ", however fine it was planned",
+            Ended::NoFiner => ", because no finer plan would help",
+            Ended::Failed => ", because a finer round failed",
             Ended::NotAsked => ", which is no more than the default: --accuracy sees to it",
         };
         write!(
@@ -131,10 +144,12 @@ pub enum RoundsError {
 /// Never more rounds than this.
 const MOST_ROUNDS: usize = 5;
 
-/// Solves until the accuracy of the settings is reached, or their time is up. `begins` is told of every plan
-/// before it is carried out, and of the rounds before it.
+/// Solves until the accuracy of the settings is reached, or their time is up. A scene that is lit by a built-in
+/// `sky` gets more directions of it where they are too few; `problem` has the first of them. `begins` is told of
+/// every plan before it is carried out, and of the rounds before it.
 pub fn solve_in_rounds(
     problem: &Problem,
+    sky: Option<&SkyLight>,
     settings: &Settings,
     means: Means,
     progress: &Progress,
@@ -142,66 +157,99 @@ pub fn solve_in_rounds(
     mut begins: impl FnMut(&Plan, &[Round]),
 ) -> Result<Reached, RoundsError> {
     let begun = Instant::now();
+    let mut problem = Cow::Borrowed(problem);
     let asked = settings.accuracy_percent;
-    let mut planned = settings.budget_s.map_or(asked, |_| pilot(asked));
-    let mut plan = Plan::new(problem, &at(settings, planned))?;
+    let mut aims = Aims::of(settings.budget_s.map_or(asked, |_| pilot(asked)));
+    let mut plan = Plan::aimed(&problem, settings, &aims)?;
     let mut rounds = Vec::new();
+    let mut last: Option<Reached> = None;
     loop {
         begins(&plan, &rounds);
         watch.lap("plan");
         progress.check().map_err(RunError::from)?;
         let round_begun = Instant::now();
-        let finished = solve_with(problem, &plan, means, progress, watch)?;
-        let worst = worst(&finished.errors);
-        let reached_percent = worst.map(|parts| parts.total_percent());
-        rounds.push(Round {
-            planned_percent: planned,
-            reached_percent,
-        });
-        let next = match worst.filter(|parts| parts.total_percent() > asked) {
-            None => Err(Ended::Reached),
-            Some(_) if !settings.in_rounds => Err(Ended::NotAsked),
-            Some(_) if rounds.len() >= MOST_ROUNDS => Err(Ended::OutOfRounds),
-            Some(parts) => {
-                let finer = finer(planned, asked, parts);
-                let left_s = settings.budget_s.map(|s| s - begun.elapsed().as_secs_f64());
-                let took_s = round_begun.elapsed().as_secs_f64();
-                match left_s {
-                    Some(left_s) => within(planned, finer, took_s, left_s),
-                    None => Some(finer),
-                }
-                .ok_or(Ended::OutOfTime)
+        let finished = match (solve_with(&problem, &plan, means, progress, watch), last) {
+            (Ok(finished), _) => finished,
+            (Err(error @ RunError::Cancelled(_)), _) | (Err(error), None) => {
+                return Err(error.into());
+            }
+            (Err(_), Some(mut before)) => {
+                before.accuracy.ended = Ended::Failed;
+                return Ok(before);
             }
         };
-        let next = next.and_then(|finer| {
-            let plan = Plan::new(problem, &at(settings, finer));
-            plan.map(|plan| (finer, plan))
+        let took_s = round_begun.elapsed().as_secs_f64();
+        let reached_percent = worst(&finished.errors).map(ErrorParts::total_percent);
+        rounds.push(Round {
+            planned: aims,
+            reached_percent,
+        });
+        let measured = Measured {
+            aims,
+            errors: &finished.errors,
+            cost_s: next::cost_s(
+                &finished.counters,
+                problem.sky_directions,
+                problem.scene.triangles.len(),
+            ),
+        };
+        let left_s = settings.budget_s.map(|s| s - begun.elapsed().as_secs_f64());
+        let next = if reached_percent.is_none_or(|reached| reached <= asked) {
+            Err(Ended::Reached)
+        } else if !settings.in_rounds {
+            Err(Ended::NotAsked)
+        } else if rounds.len() >= MOST_ROUNDS {
+            Err(Ended::OutOfRounds)
+        } else {
+            following(&measured, asked, left_s.map(|left_s| (took_s, left_s)))
+        };
+        let next = next.and_then(|aims| {
+            let mut lit = problem.clone();
+            if let Some(sky) = sky.filter(|_| aims.sky_percent < plan.aims.sky_percent) {
+                // the same sky, as it was checked before
+                lit.to_mut()
+                    .light_by(sky, aims.sky_directions(), settings.seed)
+                    .map_err(|_| Ended::NoFiner)?;
+            }
+            let plan = Plan::aimed(&lit, settings, &aims);
+            plan.map(|plan| (lit, aims, plan))
                 .map_err(|_| Ended::BeyondLimits)
         });
+        let reached = Reached {
+            accuracy: Accuracy {
+                asked_percent: asked,
+                ended: next.as_ref().err().copied().unwrap_or(Ended::Failed),
+                rounds: rounds.clone(),
+                errors: finished.errors.clone(),
+            },
+            sources: problem.sources.len(),
+            plan,
+            finished,
+        };
         match next {
-            Ok(next) => (planned, plan) = next,
-            Err(ended) => {
-                let accuracy = Accuracy {
-                    asked_percent: asked,
-                    ended,
-                    rounds,
-                    errors: finished.errors.clone(),
-                };
-                return Ok(Reached {
-                    plan,
-                    finished,
-                    accuracy,
-                });
+            Ok(next) => {
+                (problem, aims, plan) = next;
+                last = Some(reached);
             }
+            Err(_) => return Ok(reached),
         }
     }
 }
 
-fn at(settings: &Settings, accuracy_percent: f64) -> Settings {
-    Settings {
-        accuracy_percent,
-        ..*settings
-    }
+/// What to plan the next round for; where time is limited, with what the last one took and what is left.
+fn following(
+    measured: &Measured,
+    asked: f64,
+    took_and_left_s: Option<(f64, f64)>,
+) -> Result<Aims, Ended> {
+    let finer = measured.finer(asked).ok_or(Ended::NoFiner)?;
+    let finer = match took_and_left_s {
+        Some((took_s, left_s)) => measured
+            .within(finer, took_s, left_s)
+            .ok_or(Ended::OutOfTime)?,
+        None => finer,
+    };
+    Ok(measured.aims(&finer))
 }
 
 /// The band with the largest error.
@@ -211,65 +259,14 @@ fn worst(errors: &[ErrorParts]) -> Option<&ErrorParts> {
     errors.iter().max_by(by_total)
 }
 
-/// Planning for less than this makes the exchange no coarser (see `plan`: a batch has a set of axes at least).
-const COARSEST_EXCHANGE_PERCENT: f64 = 0.7;
-
-/// The next round aims a bit lower than it must: errors of errors.
-const AIM: f64 = 0.9;
-
-/// A round is not planned for an accuracy finer than the last one's by more than this: the cost grows with
-/// its square.
-const MOST_FINER: f64 = 6.0;
-
 /// What a first round is planned for that is to tell how long things take.
 fn pilot(asked: f64) -> f64 {
     asked.max((4.0 * asked).min(2.0))
 }
 
-/// What to plan the next round for.
-fn finer(planned: f64, asked: f64, parts: &ErrorParts) -> f64 {
-    let start = if parts.exchange_percent > parts.direct_percent {
-        planned.min(COARSEST_EXCHANGE_PERCENT)
-    } else {
-        planned
-    };
-    (AIM * start * asked / parts.total_percent()).max(planned / MOST_FINER)
-}
-
-/// What to plan the next round for where only so much time is left; none where that would hardly help.
-fn within(planned: f64, finer: f64, took_s: f64, left_s: f64) -> Option<f64> {
-    // what takes no less time when it is coarser
-    let start = planned.min(COARSEST_EXCHANGE_PERCENT);
-    let finest = start * (took_s.max(f64::MIN_POSITIVE) / left_s.max(0.0)).sqrt();
-    let next = finer.max(finest);
-    (next < HARDLY * start).then_some(next)
-}
-
-/// A round that is planned for more than this part of the last one's accuracy hardly helps.
-const HARDLY: f64 = 0.9;
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn parts(exchange_percent: f64, direct_percent: f64) -> ErrorParts {
-        ErrorParts {
-            band: "PAR".to_owned(),
-            exchange_percent,
-            direct_percent,
-            ..ErrorParts::default()
-        }
-    }
-
-    #[test]
-    fn the_next_round_is_finer_by_as_much_as_the_last_one_missed() {
-        let next = finer(0.5, 0.5, &parts(0.6, 0.8));
-        assert!((next - 0.45 * 0.5).abs() < 1e-12, "{next}");
-        // where lines are too few, planning for 1 % instead of 2 % would change nothing
-        let next = finer(2.0, 1.0, &parts(1.4, 0.0));
-        assert!((next - 0.9 * 0.7 / 1.4).abs() < 1e-12, "{next}");
-        assert_eq!(finer(0.6, 0.5, &parts(500.0, 0.0)), 0.6 / MOST_FINER);
-    }
 
     #[test]
     fn a_pilot_is_coarser_than_what_is_asked_for_or_as_coarse() {
@@ -277,17 +274,12 @@ mod tests {
     }
 
     #[test]
-    fn a_round_that_fits_no_more_is_made_coarser_or_left_out() {
-        assert_eq!(within(0.4, 0.1, 1.0, 100.0), Some(0.1));
-        assert_eq!(within(0.4, 0.1, 1.0, 4.0), Some(0.2));
-        assert_eq!(within(0.4, 0.1, 1.0, 1.1), None);
-        assert_eq!(within(0.4, 0.1, 1.0, -1.0), None);
-    }
-
-    #[test]
     fn the_band_with_the_largest_error_counts() {
-        let (a, b) = (parts(0.1, 0.1), parts(0.3, 0.0));
-        assert_eq!(worst(&[a, b.clone()]), Some(&b));
+        let of = |exchange_percent| ErrorParts {
+            exchange_percent,
+            ..ErrorParts::default()
+        };
+        assert_eq!(worst(&[of(0.1), of(0.3)]), Some(&of(0.3)));
         assert_eq!(worst(&[]), None);
     }
 }

@@ -1,0 +1,246 @@
+//! What to plan the next round for: pure arithmetic on what the last one measured.
+//!
+//! The error of each part is taken to fall in proportion to what it is planned for, and its cost to rise with
+//! the square. The least cost of a sum of squares then gives each part a share of the square that goes with the
+//! root of its cost times its error (Lagrange).
+
+use crate::output::errors::ErrorParts;
+use crate::plan::{Aims, COARSEST_EXCHANGE_PERCENT};
+use crate::run::Counters;
+
+/// Parts that can be planned for: exchange, direct light, directions of a sky, elements.
+const PARTS: usize = 4;
+
+/// A number for each of them.
+type PerPart = [f64; PARTS];
+
+/// A round, as the next one is planned from it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured<'a> {
+    /// What it was planned for.
+    pub(super) aims: Aims,
+    /// What came of it, by band.
+    pub(super) errors: &'a [ErrorParts],
+    /// What each part took, roughly, s.
+    pub(super) cost_s: PerPart,
+}
+
+/// Rough times of one core, ns: only their ratios matter. They are counts times constants, not clocks, so that
+/// the next round is the same on any machine.
+const ROW_ENTRY_NS: f64 = 60.0;
+const DIRECT_LINE_NS: f64 = 15.0;
+const DRAWN_TRIANGLE_NS: f64 = 40.0;
+const ELEMENT_NS: f64 = 5000.0;
+
+/// What the parts of a solve cost, s.
+pub(super) fn cost_s(counters: &Counters, sky_directions: usize, triangles: usize) -> PerPart {
+    [
+        counters.exchange.row_entries as f64 * ROW_ENTRY_NS,
+        counters.direct_lines as f64 * DIRECT_LINE_NS,
+        sky_directions as f64 * triangles as f64 * DRAWN_TRIANGLE_NS,
+        counters.elements as f64 * ELEMENT_NS,
+    ]
+    .map(|ns| 1e-9 * ns)
+}
+
+/// The next round aims a bit lower than it must: errors of errors.
+const AIM: f64 = 0.9;
+
+/// No part is planned finer than the last time by more than this: the cost grows with its square.
+const MOST_FINER: f64 = 6.0;
+
+impl Measured<'_> {
+    /// By how much each part has to err less; none where no plan helps, because what cannot be planned for is too
+    /// much alone.
+    pub(super) fn finer(&self, asked_percent: f64) -> Option<PerPart> {
+        let aimed = AIM * asked_percent;
+        let mut scale = [1.0; PARTS];
+        // each band in turn, while it is the worst
+        for _ in 0..2 * self.errors.len() {
+            let by_square = |a: &&ErrorParts, b: &&ErrorParts| {
+                square(&scaled(a, &scale)).total_cmp(&square(&scaled(b, &scale)))
+            };
+            let worst = self.errors.iter().max_by(by_square)?;
+            let parts = scaled(worst, &scale);
+            let left =
+                (aimed - worst.solver_percent).max(0.0).powi(2) - worst.far_field_percent.powi(2);
+            if left <= 0.0 {
+                return None;
+            }
+            if square(&parts) <= left * (1.0 + 1e-9) {
+                break;
+            }
+            let factors = allot(&parts, &self.cost_s, left);
+            scale = std::array::from_fn(|k| scale[k] * factors[k]);
+        }
+        Some(scale.map(|s| s.max(1.0 / MOST_FINER)))
+    }
+
+    /// The same where only so much time is left, when the last round took `took_s`; none where what fits would
+    /// hardly help.
+    pub(super) fn within(&self, finer: PerPart, took_s: f64, left_s: f64) -> Option<PerPart> {
+        let longer = |part: f64| {
+            let cost: f64 = (0..PARTS)
+                .map(|k| self.cost_s[k] * finer[k].powf(-2.0 * part))
+                .sum();
+            cost / self.cost_s.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+        };
+        let fits = |part: f64| took_s * longer(part) <= left_s;
+        if fits(1.0) {
+            return Some(finer);
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if fits(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        (low > HARDLY).then(|| finer.map(|s| s.powf(low)))
+    }
+
+    /// The aims that go with errors smaller by these factors.
+    pub(super) fn aims(&self, finer: &PerPart) -> Aims {
+        let last = &self.aims;
+        // planning for more than this makes the exchange no coarser
+        let exchange = if finer[0] < 1.0 {
+            last.exchange_percent.min(COARSEST_EXCHANGE_PERCENT)
+        } else {
+            last.exchange_percent
+        };
+        Aims {
+            exchange_percent: exchange * finer[0],
+            direct_percent: last.direct_percent * finer[1],
+            sky_percent: last.sky_percent * finer[2],
+            elements_percent: last.elements_percent * finer[3],
+        }
+    }
+}
+
+/// A round that goes less than this part of the way is not worth its time.
+const HARDLY: f64 = 0.2;
+
+fn scaled(parts: &ErrorParts, scale: &PerPart) -> PerPart {
+    let percent = [
+        parts.exchange_percent,
+        parts.direct_percent,
+        parts.sky_percent,
+        parts.elements_percent,
+    ];
+    std::array::from_fn(|k| percent[k] * scale[k])
+}
+
+fn square(parts: &PerPart) -> f64 {
+    parts.iter().map(|p| p * p).sum()
+}
+
+/// Factors, at most 1, that bring the sum of squares down to `left` for the least cost.
+fn allot(parts: &PerPart, cost_s: &PerPart, left: f64) -> PerPart {
+    let weight: PerPart = std::array::from_fn(|k| cost_s[k].sqrt() * parts[k]);
+    let mut kept = parts.map(|p| p == 0.0);
+    loop {
+        let of = |k: &usize| kept[*k];
+        let used: f64 = (0..PARTS).filter(of).map(|k| parts[k] * parts[k]).sum();
+        let all: f64 = (0..PARTS).filter(|k| !of(k)).map(|k| weight[k]).sum();
+        let factor = |k: usize| {
+            if kept[k] || all == 0.0 {
+                1.0
+            } else {
+                ((left - used).max(0.0) * weight[k] / all).sqrt() / parts[k]
+            }
+        };
+        let too_good = (0..PARTS).find(|&k| !kept[k] && factor(k) > 1.0);
+        match too_good {
+            Some(k) => kept[k] = true,
+            None => return std::array::from_fn(factor),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parts(percent: PerPart) -> ErrorParts {
+        let [
+            exchange_percent,
+            direct_percent,
+            sky_percent,
+            elements_percent,
+        ] = percent;
+        ErrorParts {
+            exchange_percent,
+            direct_percent,
+            sky_percent,
+            elements_percent,
+            ..ErrorParts::default()
+        }
+    }
+
+    fn measured(errors: &[ErrorParts]) -> Measured<'_> {
+        Measured {
+            aims: Aims::of(0.5),
+            errors,
+            cost_s: [1.0, 0.5, 0.0, 0.5],
+        }
+    }
+
+    #[test]
+    fn all_bands_are_brought_down_to_what_is_asked_for() {
+        let errors = [parts([0.2, 0.9, 0.0, 0.1]), parts([0.8, 0.1, 0.0, 0.9])];
+        let finer = measured(&errors).finer(0.5).unwrap();
+        for band in &errors {
+            let square = square(&scaled(band, &finer));
+            assert!(square <= 0.45_f64.powi(2) * 1.000_001, "{square} {finer:?}");
+        }
+        assert!(finer.iter().all(|&s| s <= 1.0), "{finer:?}");
+        assert_eq!(finer[2], 1.0);
+    }
+
+    #[test]
+    fn a_part_alone_has_all_of_the_error() {
+        let errors = [parts([0.9, 0.0, 0.0, 0.0])];
+        let finer = measured(&errors).finer(0.5).unwrap();
+        assert!((finer[0] - 0.5).abs() < 1e-9, "{finer:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_planned_for_ends_it() {
+        let far = ErrorParts {
+            far_field_percent: 3.0,
+            ..parts([0.1; 4])
+        };
+        assert_eq!(measured(&[far]).finer(0.5), None);
+    }
+
+    #[test]
+    fn no_other_split_of_the_error_costs_less() {
+        let (errors, cost) = ([0.8, 0.6, 0.0, 0.9], [1.0, 0.5, 0.0, 0.3]);
+        let of = |f: &PerPart| (0..PARTS).map(|k| cost[k] / (f[k] * f[k])).sum::<f64>();
+        let best = allot(&errors, &cost, 0.2);
+        for (a, b) in [(0, 1), (0, 3), (1, 3)] {
+            for step in [-0.01, 0.01] {
+                let mut other = best;
+                let square = |f: f64, k: usize| (f * errors[k]).powi(2);
+                other[a] = best[a] * (1.0 + step);
+                let left = square(best[a], a) + square(best[b], b) - square(other[a], a);
+                other[b] = left.sqrt() / errors[b];
+                assert!(of(&other) > of(&best), "{other:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_round_that_fits_no_more_is_made_coarser_or_left_out() {
+        let errors = [parts([1.0, 0.5, 0.0, 0.5])];
+        let measured = measured(&errors);
+        let finer = [0.25, 0.5, 1.0, 0.5];
+        assert_eq!(measured.within(finer, 1.0, 100.0), Some(finer));
+        let fits = measured.within(finer, 1.0, 4.0).unwrap();
+        assert!(fits[0] > finer[0] && fits[0] < 1.0, "{fits:?}");
+        assert_eq!(measured.within(finer, 1.0, 1.1), None);
+        assert_eq!(measured.within(finer, 1.0, -1.0), None);
+    }
+}
