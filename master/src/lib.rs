@@ -10,6 +10,7 @@ pub mod cluster;
 pub mod direct;
 pub mod exchange;
 pub mod far_field;
+mod html;
 pub mod order;
 pub mod output;
 pub mod plan;
