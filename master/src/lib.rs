@@ -23,4 +23,5 @@ pub mod service;
 pub mod solution;
 pub mod solver;
 pub mod store;
+pub mod trade;
 pub mod world;

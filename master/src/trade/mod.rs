@@ -1,0 +1,6 @@
+//! What speed costs in accuracy, measured on the user's own scene: parts of the study behind `nestrad trade`.
+
+pub mod choice;
+pub mod ledger;
+pub mod measure;
+pub mod setting;
