@@ -48,13 +48,16 @@ pub enum LedgerError {
 }
 
 impl<R: Serialize + DeserializeOwned> Ledger<R> {
-    /// Opens a file, which is made if there is none. What is no record (half a line, where a study was
+    /// Opens a file, which is made with its folder if there is none. What is no record (half a line, where a study was
     /// killed) is passed over.
     pub fn open(path: &Path) -> Result<Self, LedgerError> {
         let failed = |source| LedgerError::Io {
             path: path.to_owned(),
             source,
         };
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(failed)?;
+        }
         let text = match std::fs::read(path) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             read => read.map_err(failed)?,

@@ -76,6 +76,16 @@ impl Setting {
         self.bins.is_none() && self.times == Factors::default()
     }
 
+    /// The flags of `nestrad solve` that ask for it, if there are any.
+    pub fn flags(&self, memory_GiB: f64) -> Option<String> {
+        let (accuracy, diameter) = (self.accuracy_percent, self.diameter);
+        let mut flags = format!("--accuracy {accuracy} --diameter {diameter}");
+        if memory_GiB != Settings::default().memory_GiB {
+            flags += &format!(" --memory {memory_GiB}");
+        }
+        self.is_planned().then_some(flags)
+    }
+
     /// Its plan, if that takes no more than so much memory.
     pub fn plan(&self, problem: &Problem, memory_GiB: f64, seed: u64) -> Result<Plan, PlanError> {
         let settings = Settings {
@@ -220,11 +230,14 @@ mod tests {
     #[test]
     fn a_name_says_what_is_changed() {
         let mut setting = Setting::planned(0.5, Diameter::Metres(0.4));
-        assert!(setting.is_planned());
         assert_eq!(setting.to_string(), "0.5 %, D 0.4 m");
+        let flags = setting.flags(8.0);
+        assert_eq!(flags.as_deref(), Some("--accuracy 0.5 --diameter 0.4"));
+        let flags = setting.flags(20.5).expect("as planned");
+        assert!(flags.ends_with(" --memory 20.5"), "{flags}");
         setting.bins = Some(3);
         setting.times.direct_pitch = 2.0;
-        assert!(!setting.is_planned());
+        assert_eq!(setting.flags(8.0), None);
         assert_eq!(
             setting.to_string(),
             "0.5 %, D 0.4 m, 3 bins, direct pitch x 2"

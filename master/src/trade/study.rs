@@ -10,6 +10,7 @@ use serde::{Deserialize, Serialize};
 use super::error::TradeError;
 use super::ledger::Ledger;
 use super::measure::Reference;
+use super::pace::Pace;
 use super::setting::{Factors, Setting};
 use crate::output::errors::organ_errors;
 use crate::output::progress::Progress;
@@ -32,7 +33,7 @@ pub struct Request<'a> {
     pub finest_percent: f64,
     /// Memory that a solve may take, GiB.
     pub memory_GiB: f64,
-    /// Runs of each setting.
+    /// Runs of each setting, at least two: their scatter is in the error bars.
     pub runs: u32,
     /// Seed of the first run; the others follow it.
     pub seed: u64,
@@ -154,7 +155,7 @@ pub fn run(
     let against = key(&keys.iter().map(String::as_str).collect::<Vec<_>>());
     let mut measured: Vec<Result<Vec<Done>, String>> = vec![Ok(Vec::new()); request.settings.len()];
     let total = request.settings.len() * request.runs as usize;
-    let (mut number, mut spent_s) = (0, 0.0);
+    let (mut number, mut pace) = (0, Pace::new(request.settings.len()));
     // seeds outermost: a machine that slows down does so for all settings
     for run in 0..u64::from(request.runs) {
         for (place, setting) in request.settings.iter().enumerate() {
@@ -167,15 +168,16 @@ pub fn run(
                 Ok(plan) => plan,
                 Err(error) => {
                     measured[place] = Err(error.to_string());
+                    pace.failed(place);
                     continue;
                 }
             };
             let threads = rayon::current_num_threads().to_string();
             let key = key(&[&world, &against, &json(&plan)?, &threads]);
             if ledger.get(&key).is_none() {
-                let left_s = spent_s / f64::from(number as u32) * (total - number) as f64;
+                let left = pace.left(place, u64::from(request.runs) - 1 - run);
                 say(&format!(
-                    "run {number} of {total}, {setting}, seed {seed}; about {left_s:.0} s left"
+                    "run {number} of {total}, {setting}, seed {seed}; {left}"
                 ));
                 let record = match solved(problem, &plan, progress) {
                     Ok((finished, cost)) => {
@@ -189,12 +191,15 @@ pub fn run(
             }
             match ledger.get(&key) {
                 Some(Record::Run(done)) => {
-                    spent_s += done.wall_s;
+                    pace.took(place, done.wall_s);
                     if let Ok(runs) = &mut measured[place] {
                         runs.push(done.clone());
                     }
                 }
-                Some(Record::Failed(why)) => measured[place] = Err(format!("seed {seed}: {why}")),
+                Some(Record::Failed(why)) => {
+                    measured[place] = Err(format!("seed {seed}: {why}"));
+                    pace.failed(place);
+                }
                 Some(Record::Reference(_)) | None => {}
             }
         }
