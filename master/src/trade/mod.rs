@@ -8,6 +8,7 @@ mod pace;
 pub mod setting;
 pub mod study;
 pub mod table;
+mod terminal;
 
 use std::path::Path;
 
