@@ -10,6 +10,8 @@ use nestrad_common::options::Diameter;
 use nestrad_master::output::progress::Progress;
 use nestrad_master::trade::setting::{Setting, grid};
 use nestrad_master::trade::study::{Request, run};
+use nestrad_master::trade::table::Comparison;
+use nestrad_master::trade::{About, write};
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
 
 #[test]
@@ -32,6 +34,26 @@ fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
     let again = run(&request, &progress, |_| {}).unwrap();
     assert_eq!(again.computed, 0);
     assert_eq!(again.measured, first.measured);
+    let written = [&first, &again].map(|study| {
+        let comparison = Comparison::of(&request, study);
+        for choice in &comparison.choices {
+            if let Ok(row) = choice.chosen {
+                let chosen = comparison.rows[row].outcome.as_ref().unwrap();
+                let highs = chosen.errors.iter().map(|error| error.high_percent);
+                assert!(highs.fold(0.0, f64::max) <= choice.target_percent);
+            }
+        }
+        assert!(comparison.choices[0].chosen.is_ok());
+        let about = About {
+            title: "small maize",
+            runs: request.runs,
+            threads: 2,
+            sky_directions: Some(46),
+        };
+        write(folder.path(), &about, &comparison).unwrap();
+        ["trade.csv", "trade.html"].map(|name| std::fs::read(folder.path().join(name)).unwrap())
+    });
+    assert!(written[0] == written[1]);
     for (band, (name, reference)) in first.bands.iter().enumerate() {
         let errors: Vec<f64> = first
             .measured

@@ -14,7 +14,7 @@ use nestrad_master::plan::Settings;
 use nestrad_master::trade::setting::grid;
 use nestrad_master::trade::study::{Request, run};
 use nestrad_master::trade::table::Comparison;
-use nestrad_master::trade::write;
+use nestrad_master::trade::{About, write};
 use rayon::ThreadPoolBuilder;
 
 use super::console::{self, Notes};
@@ -23,7 +23,7 @@ use super::flags::{SceneFlags, positive};
 /// Try settings of `solve` on a scene, and say which is the fastest for an error
 ///
 /// A reference is computed first, then every setting with several seeds; this takes many times as long as a
-/// solve. DIR gets trade.csv and trade.jsonl, in which all that was computed is kept: a study that was
+/// solve. DIR gets trade.html to look at, trade.csv, and trade.jsonl, in which all that was computed is kept: a study that was
 /// stopped goes on where it ended. Accuracy and diameter in a scene file do not count.
 /// The choice for each error goes to stdout.
 #[derive(Debug, Args)]
@@ -114,7 +114,18 @@ impl HowFlags {
         let progress = Progress::new(self.quiet);
         let study = run(&request, &progress, |line| notes.say("trade", line))?;
         let comparison = Comparison::of(&request, &study);
-        write(&self.out, &comparison)?;
+        let scenes: Vec<String> = inputs
+            .scenes
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        let about = About {
+            title: &scenes.join(", "),
+            runs: self.seeds,
+            threads: rayon::current_num_threads(),
+            sky_directions: loaded.sky.as_ref().map(|_| problem.sources.len()),
+        };
+        write(&self.out, &about, &comparison)?;
         if self.quiet {
             return Ok(());
         }

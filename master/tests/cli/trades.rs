@@ -21,9 +21,11 @@ fn a_study_is_written_and_not_computed_again() {
     assert!(first.stderr.contains(" left\n"), "{}", first.stderr);
     let before = files(&desk.path("out"));
     let names: Vec<&str> = before.iter().map(|(name, _)| name.as_str()).collect();
-    assert_eq!(names, ["trade.csv", "trade.jsonl"]);
+    assert_eq!(names, ["trade.csv", "trade.html", "trade.jsonl"]);
     let table = desk.text("out/trade.csv");
     assert!(table.contains(",PAR,") && table.contains(",NIR,"));
+    let page = desk.text("out/trade.html");
+    assert!(page.contains("plants.can") && page.ends_with("</html>\n"));
 
     let again = desk.done(&TRADE);
     assert!(again.stderr.contains("0 runs"), "{}", again.stderr);
