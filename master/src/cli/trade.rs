@@ -132,6 +132,13 @@ impl HowFlags {
         let mut table = Vec::new();
         comparison.write_choices(&mut table)?;
         console::print(&table)?;
+        if let Some(directions) = about.sky_directions {
+            let line = format!(
+                "all runs had {directions} directions; solve takes as many as its --accuracy asks for, and the \
+                 error of having fewer is not in these numbers"
+            );
+            notes.say("sky", &line);
+        }
         for (row, why) in comparison.failed() {
             notes.say("failed", &format!("{}: {why}", row.setting));
         }

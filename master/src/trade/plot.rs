@@ -58,9 +58,11 @@ pub(super) fn draw(plot: &Plot) -> String {
         "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" aria-label=\"error over {}\">\n",
         plot.x_title
     );
-    let mut ticks = x_axis.ticks().into_iter();
     let infinity = unbounded.then(|| (RIGHT - 0.3 * INFINITY, "inf".to_owned()));
-    let verticals = ticks.by_ref().map(|(v, label)| (x_axis.place(v), label));
+    let verticals = x_axis
+        .ticks()
+        .into_iter()
+        .map(|(v, label)| (x_axis.place(v), label));
     for (at, label) in verticals.chain(infinity) {
         put(
             &mut svg,

@@ -73,8 +73,7 @@ impl Comparison {
 
 /// An error with its ends, percent.
 pub(super) fn range(error: ErrorRange) -> String {
-    let [value, low, high] =
-        [error.percent, error.low_percent, error.high_percent].map(|percent| short(percent));
+    let [value, low, high] = [error.percent, error.low_percent, error.high_percent].map(short);
     format!("{value} ({low} to {high})")
 }
 
