@@ -21,6 +21,7 @@ fn main() -> ExitCode {
         Command::Report(args) => args.run(),
         Command::Serve(args) => args.run(),
         Command::Status(args) => args.run(),
+        Command::Trade(args) => args.run(),
     };
     cli::exit_code(outcome)
 }

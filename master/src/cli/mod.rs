@@ -11,6 +11,7 @@ mod serve;
 mod solve;
 mod state;
 mod status;
+mod trade;
 mod workers;
 
 use clap::{Parser, Subcommand};
@@ -37,6 +38,7 @@ pub(crate) enum Command {
     Report(report::ReportArgs),
     Serve(serve::ServeArgs),
     Status(status::StatusArgs),
+    Trade(Box<trade::TradeArgs>),
 }
 
 #[cfg(test)]

@@ -6,16 +6,16 @@
 //! [`atomic`] for what that means to a reader of the folder.
 
 pub mod atomic;
-mod csv;
+pub(crate) mod csv;
 mod error;
 pub mod errors;
 mod finite;
-mod number;
+pub(crate) mod number;
 mod parquet;
 pub mod progress;
 pub mod resources;
 pub mod summary;
-mod table;
+pub(crate) mod table;
 mod tables;
 pub mod terminal;
 mod vtk_xml;

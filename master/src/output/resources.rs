@@ -2,10 +2,10 @@
 
 use std::time::Instant;
 
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The cost of a named stage of a run.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Stage {
     /// What was done.
     pub name: String,
@@ -106,6 +106,12 @@ pub fn cpu_seconds() -> f64 {
 /// The most memory that this process ever had resident, bytes.
 pub fn peak_memory_bytes() -> Option<u64> {
     peak_in(&std::fs::read_to_string("/proc/self/status").ok()?)
+}
+
+/// Begins the peak anew with what is resident now, or says that the system does not do so.
+pub fn forget_peak_memory() -> bool {
+    // see clear_refs in proc(5)
+    std::fs::write("/proc/self/clear_refs", "5").is_ok()
 }
 
 fn peak_in(status: &str) -> Option<u64> {

@@ -230,7 +230,6 @@ impl Plan {
                 .sqrt()
                 .max(f64::MIN_POSITIVE),
         );
-        limits::check_elements(problem, max_edge_m)?;
         // points on the outline of an organ: see `spread_effort`
         let direct_line_area_m2 = (scale.organ_area_m2 / 11_000.0 * of_direct.powf(4.0 / 3.0))
             .min(scale.triangle_area_m2 / 4.0)
@@ -240,7 +239,7 @@ impl Plan {
                 scale.ground_area_m2 / 1e4,
             )
             .max(f64::MIN_POSITIVE);
-        let mut plan = Self {
+        let plan = Self {
             aims: *aims,
             scale,
             max_edge_m,
@@ -258,15 +257,24 @@ impl Plan {
             memory: Memory::default(),
             reasons: Vec::new(),
         };
-        plan.memory = Memory::of(problem, &plan);
-        if plan.memory.total_GiB() > settings.memory_GiB {
-            return Err(PlanError::Memory {
-                needed: plan.memory,
-                limit_GiB: settings.memory_GiB,
-            });
-        }
+        let mut plan = plan.within(problem, settings.memory_GiB)?;
         plan.reasons = reasons::of(problem, settings, &plan);
         Ok(plan)
+    }
+
+    /// The plan as it is after its fields were changed, with the memory that it takes now, or why there is not
+    /// enough of it. Its reasons are gone: they were those of the plan before the change.
+    pub fn within(mut self, problem: &Problem, memory_GiB: f64) -> Result<Self, PlanError> {
+        limits::check_elements(problem, self.max_edge_m)?;
+        self.memory = Memory::of(problem, &self);
+        self.reasons.clear();
+        if self.memory.total_GiB() <= memory_GiB {
+            return Ok(self);
+        }
+        Err(PlanError::Memory {
+            needed: self.memory,
+            limit_GiB: memory_GiB,
+        })
     }
 
     /// The world that this plan works in.

@@ -16,13 +16,13 @@ const PAUSE: Duration = Duration::from_secs(1);
 
 /// When free memory was last given back.
 #[derive(Default)]
-pub(super) struct Freed {
+pub(crate) struct Freed {
     last: Option<Instant>,
 }
 
 impl Freed {
     /// Gives free memory back to the system, unless that was done just now.
-    pub(super) fn give_back(&mut self) {
+    pub(crate) fn give_back(&mut self) {
         if self.last.is_some_and(|last| last.elapsed() < PAUSE) {
             return;
         }

@@ -8,7 +8,7 @@ mod budget;
 mod compute;
 mod connection;
 mod error;
-mod heap;
+pub(crate) mod heap;
 mod identity;
 mod intake;
 mod metrics;

@@ -32,6 +32,16 @@ const SOLVE: [&str; 12] = [
     "standard-overcast",
 ];
 
+const TRADE: [&str; 7] = [
+    "--out <DIR>",
+    "--seeds <N>",
+    "--finest <PERCENT>",
+    "--memory <GIB>",
+    "--threads <N>",
+    "--seed <N>",
+    "--quiet",
+];
+
 const SERVE: [&str; 16] = [
     "--listen <ADDRESS:PORT>",
     "--tls-cert <FILE>",
@@ -83,9 +93,11 @@ const RANDOM: [&str; 8] = [
 fn help_mentions_every_option() {
     let desk = Desk::new();
     let solve = [&SCENE[..], &SOLVE, &MASTER].concat();
+    let trade = [&SCENE[..], &TRADE].concat();
     for (command, options) in [
         (&["solve"][..], &solve[..]),
         (&["check"], &SCENE),
+        (&["trade"], &trade),
         (&["serve"], &SERVE),
         (&["status"], &MASTER),
         (&["generate", "maize"], &PLANTS),
@@ -103,7 +115,7 @@ fn help_mentions_every_option() {
 fn the_program_lists_its_commands_and_says_its_version() {
     let desk = Desk::new();
     let help = desk.done(&["--help"]).stdout;
-    for command in ["solve", "check", "generate", "serve", "status"] {
+    for command in ["solve", "check", "generate", "serve", "status", "trade"] {
         assert!(help.contains(&format!("  {command} ")), "{help}");
     }
     let version = desk.done(&["--version"]).stdout;

@@ -8,3 +8,4 @@ mod generated;
 mod help;
 mod refusals;
 mod results;
+mod trades;

@@ -56,6 +56,7 @@ proptest! {
     ) {
         use v1::scene_slice::Part;
         let header = v1::SceneHeader {
+            sky_directions: 0,
             geometry: Some(v1::scene_header::Geometry::NewGeometry(header())),
             bands: vec![band("PAR")],
             sources: vec![sun()],

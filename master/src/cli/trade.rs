@@ -1,0 +1,142 @@
+//! `nestrad trade`: what speed costs in accuracy, on the user's own scene.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, Result};
+use clap::Args;
+use clap::builder::RangedU64ValueParser;
+use nestrad_common::assemble;
+use nestrad_common::inputs::Inputs;
+use nestrad_common::options::Options;
+use nestrad_master::output::{check_writable, progress::Progress};
+use nestrad_master::plan::{Aims, Settings};
+use nestrad_master::trade::setting::grid;
+use nestrad_master::trade::study::{Request, run};
+use nestrad_master::trade::table::Comparison;
+use nestrad_master::trade::{About, write};
+use rayon::ThreadPoolBuilder;
+
+use super::console::{self, Notes};
+use super::flags::{SceneFlags, positive};
+
+/// Try settings of `solve` on a scene, and say which is the fastest for an error
+///
+/// A reference is computed first, then every setting with several seeds; this takes many times as long as a
+/// solve. DIR gets trade.html to look at, trade.csv, and trade.jsonl, in which all that was computed is kept: a
+/// study that was stopped goes on where it ended. Accuracy and diameter in a scene file do not count.
+/// The choice for each error goes to stdout.
+#[derive(Debug, Args)]
+pub(crate) struct TradeArgs {
+    #[command(flatten)]
+    scene: SceneFlags,
+
+    #[command(flatten)]
+    how: HowFlags,
+}
+
+#[derive(Debug, Args)]
+#[command(next_help_heading = "How to study it")]
+struct HowFlags {
+    /// Folder for the study; made if there is none
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+
+    /// Runs of each setting, each with its own seed, at least 2: their scatter is in the error bars
+    #[arg(long, value_name = "N", default_value_t = 3)]
+    #[arg(value_parser = RangedU64ValueParser::<u32>::new().range(2..=1000))]
+    seeds: u32,
+
+    /// Smallest error that a setting is wanted for, percent: rms over organs, relative to the mean
+    ///
+    /// The reference is planned for half of it, and a built-in sky has directions of its own in each run.
+    #[arg(long, value_name = "PERCENT", default_value_t = 0.2)]
+    #[arg(value_parser = positive, allow_negative_numbers = true)]
+    finest: f64,
+
+    /// Memory that a solve may take, GiB; a setting that needs more is listed as failed [default: 8]
+    #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
+    memory: Option<f64>,
+
+    /// Threads to compute with, 0 for one per processor [default: 0]
+    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(0..=4096))]
+    threads: Option<usize>,
+
+    /// Seed of the first run of each setting; the others follow it [default: 1]
+    #[arg(long, value_name = "N")]
+    seed: Option<u64>,
+
+    /// Say nothing but errors: no progress, no table
+    #[arg(long, short)]
+    quiet: bool,
+}
+
+impl TradeArgs {
+    pub(crate) fn run(self) -> Result<()> {
+        let Self { scene, how } = self;
+        let inputs = scene.inputs(Options {
+            memory_GiB: how.memory,
+            threads: how.threads,
+            seed: how.seed,
+            ..Options::default()
+        })?;
+        let threads = inputs.options.threads.unwrap_or(0);
+        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        pool.context("cannot start threads")?
+            .install(|| how.study(&inputs))
+    }
+}
+
+impl HowFlags {
+    fn study(&self, inputs: &Inputs) -> Result<()> {
+        let notes = Notes { quiet: self.quiet };
+        let default = Settings::default();
+        let seed = inputs.options.seed.unwrap_or(default.seed);
+        let loaded = assemble::load(inputs)?;
+        for warning in &loaded.inspection.warnings {
+            notes.say("warning", warning);
+        }
+        let mut problem = loaded.problem;
+        if let Some(sky) = &loaded.sky {
+            problem.light_by(sky, Aims::of(self.finest).sky_directions(), seed)?;
+        }
+        check_writable(&self.out)?;
+        let settings = grid(&problem, self.finest);
+        let request = Request {
+            problem: &problem,
+            sky: loaded.sky.as_ref(),
+            out: &self.out,
+            settings: &settings,
+            finest_percent: self.finest,
+            memory_GiB: inputs.options.memory_GiB.unwrap_or(default.memory_GiB),
+            runs: self.seeds,
+            seed,
+        };
+        let progress = Progress::new(self.quiet);
+        let study = run(&request, &progress, |line| notes.say("trade", line))?;
+        let comparison = Comparison::of(&request, &study);
+        let scenes: Vec<String> = inputs
+            .scenes
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        let about = About {
+            title: &scenes.join(", "),
+            runs: self.seeds,
+            threads: rayon::current_num_threads(),
+        };
+        write(&self.out, &about, &comparison)?;
+        if self.quiet {
+            return Ok(());
+        }
+        let mut table = Vec::new();
+        comparison.write_choices(&mut table)?;
+        console::print(&table)?;
+        for (row, why) in comparison.failed() {
+            notes.say("failed", &format!("{}: {why}", row.setting));
+        }
+        let (computed, place) = (study.computed, self.out.display());
+        let line = format!("{computed} runs were computed, results are in {place}");
+        notes.say("done", &line);
+        Ok(())
+    }
+}

@@ -1,0 +1,87 @@
+//! A study of speed and accuracy on a small canopy.
+
+#![allow(
+    non_snake_case,
+    reason = "units in names are written as units: irradiance_W_m2"
+)]
+#![allow(clippy::unwrap_used, reason = "what cannot be set up fails the test")]
+
+use nestrad_common::options::Diameter;
+use nestrad_master::output::progress::Progress;
+use nestrad_master::trade::setting::{Setting, grid};
+use nestrad_master::trade::study::{Request, run};
+use nestrad_master::trade::table::Comparison;
+use nestrad_master::trade::{About, write};
+use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
+
+#[test]
+fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
+    let problem = problem(&small_maize(), &par_and_nir(), uniform_sky(46, 2));
+    let folder = tempfile::tempdir().unwrap();
+    let settings = [5.0, 0.7, 0.35].map(|a| Setting::planned(a, Diameter::Infinite));
+    let request = Request {
+        problem: &problem,
+        sky: None,
+        out: folder.path(),
+        settings: &settings,
+        finest_percent: 0.5,
+        memory_GiB: 4.0,
+        runs: 2,
+        seed: 1,
+    };
+    let progress = Progress::new(true);
+    let first = run(&request, &progress, |_| {}).unwrap();
+    assert_eq!(first.computed, 3 + 2 * settings.len());
+    let again = run(&request, &progress, |_| {}).unwrap();
+    assert_eq!(again.computed, 0);
+    assert_eq!(again.measured, first.measured);
+    let written = [&first, &again].map(|study| {
+        let comparison = Comparison::of(&request, study);
+        for choice in &comparison.choices {
+            if let Ok(row) = choice.chosen {
+                let chosen = comparison.rows[row].outcome.as_ref().unwrap();
+                let highs = chosen.errors.iter().map(|error| error.high_percent);
+                assert!(highs.fold(0.0, f64::max) <= choice.target_percent);
+            }
+        }
+        assert!(comparison.choices[0].chosen.is_ok());
+        let about = About {
+            title: "small maize",
+            runs: request.runs,
+            threads: 2,
+        };
+        write(folder.path(), &about, &comparison).unwrap();
+        ["trade.csv", "trade.html"].map(|name| std::fs::read(folder.path().join(name)).unwrap())
+    });
+    assert!(written[0] == written[1]);
+    for (band, (name, reference)) in first.bands.iter().enumerate() {
+        let errors: Vec<f64> = first
+            .measured
+            .iter()
+            .map(|runs| {
+                let runs = runs.as_ref().unwrap();
+                let squares: Vec<f64> = runs.iter().map(|r| r.square_percent2[band]).collect();
+                reference.range(&squares).percent
+            })
+            .collect();
+        assert!(errors.is_sorted_by(|a, b| a > b), "{name}: {errors:?}");
+    }
+}
+
+#[test]
+fn a_grid_has_no_plan_twice_and_nothing_far_finer_than_its_finest_target() {
+    let problem = problem(&small_maize(), &par_and_nir(), uniform_sky(46, 2));
+    let settings = grid(&problem, 2.0);
+    assert!(
+        settings.iter().all(|s| s.accuracy_percent >= 1.6),
+        "{settings:?}"
+    );
+    let spheres = settings.iter().filter(|s| s.diameter != Diameter::Infinite);
+    assert!(spheres.count() > 3, "{settings:?}");
+    let finer = grid(&problem, 0.2);
+    let names: Vec<String> = finer.iter().map(ToString::to_string).collect();
+    assert!(
+        finer.len() > settings.len() && finer.len() < 40,
+        "{names:?}"
+    );
+}
