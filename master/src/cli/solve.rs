@@ -68,12 +68,12 @@ struct HowFlags {
     #[arg(long, value_name = "auto|inf|METRES", allow_negative_numbers = true)]
     diameter: Option<Diameter>,
 
-    /// Standard error to reach, percent: rms over organs, relative to the canopy's mean [default: 0.5]
+    /// Error to reach, percent, bias included: rms over organs, relative to the canopy's mean [default: 0.5]
     ///
     /// It sets how many lines are traced. Where it is given and a round misses it in some band, a finer one
     /// follows; the default is one round, whatever it reaches.
-    /// It also sets how many directions a built-in sky begins with (1132 at 0.5 %, 476 at 1 %, 200 at 2 %; 4000
-    /// at most).
+    /// It also sets how many directions a built-in sky begins with (1132 at 0.5 %, 476 at 1 %, 200 at 2 %;
+    /// 4000 at most).
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     accuracy: Option<f64>,
 
