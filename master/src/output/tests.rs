@@ -118,11 +118,11 @@ fn tables_byte_for_byte() {
     );
     assert_eq!(
         read("organs.csv"),
-        r#"plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W
-2,"leaf 1, ""flag""",0.0,PAR,0.0,0.0,0.0,0.0,0.0
-2,"leaf 1, ""flag""",0.0,NIR,0.0,0.0,0.0,0.0,0.0
-1,1001,0.625,PAR,300.0,20.0,33.3333333,30.0,0.125
-1,1001,0.625,NIR,30.0,2.0,3.33333333,3.0,0.0125
+        r#"plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W
+2,"leaf 1, ""flag""",0.0,PAR,0.0,0.0,0.0,0.0,0.0,0.0
+2,"leaf 1, ""flag""",0.0,NIR,0.0,0.0,0.0,0.0,0.0,0.0
+1,1001,0.625,PAR,300.0,20.0,33.3333333,30.0,0.125,0.25
+1,1001,0.625,NIR,30.0,2.0,3.33333333,3.0,0.0125,0.0
 "#
     );
     assert_eq!(

@@ -35,7 +35,7 @@ fn tables_are_complete_and_finite() {
     for (table, head, rows) in [
         (
             &organs,
-            "plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W",
+            "plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W",
             3 * bands,
         ),
         (
@@ -200,7 +200,7 @@ fn a_plant_alone_under_a_sky() {
         ["organs.csv", "summary.json", "triangles.csv"]
     );
     let summary: Value = serde_json::from_str(&desk.text("out/summary.json")).unwrap();
-    assert_eq!(summary["options"]["sources"], 85);
+    assert_eq!(summary["options"]["sources"], 200);
 }
 
 #[test]
