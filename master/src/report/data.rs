@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::ReportError;
 use super::profile::PatchLight;
 use super::table::Table;
+use crate::rounds::Accuracy;
 use crate::solution::Balance;
 
 /// What a report needs of `summary.json`.
@@ -50,6 +51,8 @@ pub(crate) struct SceneFacts {
 pub(crate) struct Plan {
     pub(crate) scale: Scale,
     pub(crate) reasons: Vec<String>,
+    /// What the errors come from; results of an earlier version do not have it.
+    pub(crate) accuracy: Option<Accuracy>,
 }
 
 /// Sizes that the plan is made by.

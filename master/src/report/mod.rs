@@ -24,6 +24,7 @@ use self::data::{Organ, OrganErrors, Results, Soil};
 use self::page::Blob;
 use self::profile::{LIT_STEP, Layer, Patch};
 use crate::output::atomic::Staging;
+use crate::output::errors::ErrorParts;
 use crate::output::{OutputError, REPORT};
 use crate::solution::Balance;
 
@@ -84,6 +85,8 @@ struct Facts<'a> {
     resources: &'a serde_json::Value,
     balance: &'a [Balance],
     errors: &'a [OrganErrors],
+    /// What they come from, of bands in which anything is absorbed.
+    error_parts: &'a [ErrorParts],
     reasons: &'a [String],
     organs: &'a [Organ],
     layers: &'a [Layer],
@@ -146,6 +149,7 @@ pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
         resources: &summary.resources,
         balance,
         errors: &summary.error_estimates,
+        error_parts: summary.plan.accuracy.as_ref().map_or(&[], |a| &a.errors),
         reasons: &summary.plan.reasons,
         organs: &results.organs,
         layers: &profile::layers(&patches, &above, LAYERS),

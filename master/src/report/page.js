@@ -121,7 +121,18 @@ function showErrors() {
     const closure = report.balance[k].closure_W;
     const rms = error.rms_percent === null ? '—' : `${error.rms_percent.toFixed(2)} %`;
     return [html(error.band), rms, closure.se > 0 ? `${(Math.abs(closure.value) / closure.se).toFixed(1)}` : '—'];
-  })) + `<p class="hint">Root mean square over all organs, in percent of the mean absorbed per leaf area; asked for: ${report.accuracy_percent} %. A triangle’s error is larger than its organ’s.</p>`;
+  })) + `<p class="hint">Root mean square over all organs, in percent of the mean absorbed per leaf area; asked for: ${report.accuracy_percent} %. A triangle’s error is larger than its organ’s.</p>` + errorParts();
+}
+
+// what is nothing in all bands is not worth a column
+function errorParts() {
+  const parts = [['exchange', 'exchange_percent'], ['direct light', 'direct_percent'], ['directions of the sky', 'sky_percent'],
+    ['size of elements', 'elements_percent'], ['far field', 'far_field_percent'], ['solver', 'solver_percent']];
+  const shown = parts.filter(([, key]) => report.error_parts.some((part) => part[key] >= 0.005));
+  if (shown.length === 0) return '';
+  return table(['what it comes from, %', ...shown.map(([name]) => name)],
+    report.error_parts.map((part) => [html(part.band), ...shown.map(([, key]) => part[key].toFixed(2))])) +
+    '<p class="hint">The standard error holds the sampling of exchange and direct light; the other parts come on top of it.</p>';
 }
 
 function showFacts() {
