@@ -49,6 +49,10 @@ const AIM: f64 = 0.9;
 /// No part is planned finer than the last time by more than this: the cost grows with its square.
 const MOST_FINER: f64 = 6.0;
 
+/// Where what cannot be planned for leaves less than this of the square, the rest would have to be far finer than
+/// is asked for, and the whole hardly better.
+const LEAST_LEFT: f64 = 0.3;
+
 impl Measured<'_> {
     /// By how much each part has to err less; none where no plan helps, because what cannot be planned for is too
     /// much alone.
@@ -57,14 +61,18 @@ impl Measured<'_> {
         let mut scale = [1.0; PARTS];
         // each band in turn, while it is the worst
         for _ in 0..2 * self.errors.len() {
-            let by_square = |a: &&ErrorParts, b: &&ErrorParts| {
-                square(&scaled(a, &scale)).total_cmp(&square(&scaled(b, &scale)))
+            let total = |parts: &ErrorParts| {
+                square(&scaled(parts, &scale))
+                    .sqrt()
+                    .hypot(parts.far_field_percent)
+                    + parts.solver_percent
             };
-            let worst = self.errors.iter().max_by(by_square)?;
+            let by_total = |a: &&ErrorParts, b: &&ErrorParts| total(a).total_cmp(&total(b));
+            let worst = self.errors.iter().max_by(by_total)?;
             let parts = scaled(worst, &scale);
             let left =
                 (aimed - worst.solver_percent).max(0.0).powi(2) - worst.far_field_percent.powi(2);
-            if left <= 0.0 {
+            if left <= LEAST_LEFT * aimed * aimed {
                 return None;
             }
             if square(&parts) <= left * (1.0 + 1e-9) {
@@ -213,6 +221,15 @@ mod tests {
             ..parts([0.1; 4])
         };
         assert_eq!(measured(&[far]).finer(0.5), None);
+    }
+
+    #[test]
+    fn a_band_that_nothing_helps_is_not_passed_over_for_one_that_is_noisier() {
+        let far = ErrorParts {
+            far_field_percent: 2.3,
+            ..parts([0.1; 4])
+        };
+        assert_eq!(measured(&[parts([0.6; 4]), far]).finer(2.0), None);
     }
 
     #[test]
