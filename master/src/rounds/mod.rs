@@ -1,7 +1,7 @@
 //! Solves in rounds until the error that was asked for is reached.
 //!
 //! The first round is planned for what was asked, and is the only one where nothing was. Where its own errors say
-//! that it missed, or where time is short, the next is planned by what the last one measured ([`next`]).
+//! that it missed, or where time is short, the next is planned by what the last one measured (`next.rs`).
 
 mod next;
 
