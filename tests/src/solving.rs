@@ -84,3 +84,16 @@ pub fn shares(solution: &Solution, band: usize) -> Shares {
         closure: part(balance.closure_W.value),
     }
 }
+
+/// Rms over organs of how far absorbed powers per area lie apart, percent of the mean.
+pub fn apart_percent(a: &Solution, b: &Solution, band: usize) -> f64 {
+    let bands = a.balance.len();
+    let (mut area, mut mean, mut square) = (0.0, 0.0, 0.0);
+    for (organ, &own) in a.organ_area_m2.iter().enumerate() {
+        let [x, y] = [a, b].map(|s| &s.organs[organ * bands + band]);
+        area += own;
+        mean += y.absorbed_W;
+        square += (x.absorbed_W - y.absorbed_W).powi(2) / own;
+    }
+    100.0 * (square * area).sqrt() / mean
+}

@@ -10,9 +10,8 @@ use nestrad_master::output::resources::Stopwatch;
 use nestrad_master::plan::{Estimator, Settings};
 use nestrad_master::rounds::{Ended, Reached, solve_in_rounds};
 use nestrad_master::run::Means;
-use nestrad_master::solution::Solution;
 use nestrad_tests::canopies::{par_and_nir, problem, uniform_sky};
-use nestrad_tests::solving::{plan, solve};
+use nestrad_tests::solving::{apart_percent, plan, solve};
 
 fn reach(problem: &Problem, settings: &Settings) -> Reached {
     let (means, progress) = (Means::default(), Progress::new(true));
@@ -44,19 +43,6 @@ fn maize(plants_per_row: u32) -> Problem {
         &par_and_nir(),
         uniform_sky(46, 2),
     )
-}
-
-/// Rms over organs of how far absorbed powers per area lie apart, percent of the mean.
-fn apart_percent(a: &Solution, b: &Solution, band: usize) -> f64 {
-    let bands = a.balance.len();
-    let (mut area, mut mean, mut square) = (0.0, 0.0, 0.0);
-    for (organ, &own) in a.organ_area_m2.iter().enumerate() {
-        let [x, y] = [a, b].map(|s| &s.organs[organ * bands + band]);
-        area += own;
-        mean += y.absorbed_W;
-        square += (x.absorbed_W - y.absorbed_W).powi(2) / own;
-    }
-    100.0 * (square * area).sqrt() / mean
 }
 
 #[test]

@@ -10,27 +10,13 @@ use nestrad_common::problem::Problem;
 use nestrad_master::output::errors::ErrorParts;
 use nestrad_master::plan::{Aims, Plan, Settings};
 use nestrad_master::run::Finished;
-use nestrad_master::solution::Solution;
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
-use nestrad_tests::solving::{finish, solve};
+use nestrad_tests::solving::{apart_percent, finish, solve};
 
 const BANDS: [usize; 2] = [0, 1];
 
 fn maize() -> Problem {
     problem(&small_maize(), &par_and_nir(), uniform_sky(46, 2))
-}
-
-/// Rms over organs of how far absorbed powers per area lie apart, percent of the mean.
-fn apart_percent(a: &Solution, b: &Solution, band: usize) -> f64 {
-    let bands = a.balance.len();
-    let (mut area, mut mean, mut square) = (0.0, 0.0, 0.0);
-    for (organ, &own) in a.organ_area_m2.iter().enumerate() {
-        let [x, y] = [a, b].map(|s| &s.organs[organ * bands + band]);
-        area += own;
-        mean += y.absorbed_W;
-        square += (x.absorbed_W - y.absorbed_W).powi(2) / own;
-    }
-    100.0 * (square * area).sqrt() / mean
 }
 
 /// Whether what is stated is right to a factor of two.

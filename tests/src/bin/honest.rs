@@ -21,7 +21,7 @@ use nestrad_master::run::Means;
 use nestrad_master::solution::Solution;
 use nestrad_tests::canopies::{par_and_nir, problem, small_leaves, small_maize};
 use nestrad_tests::reference::{misfit, organs, sample, shared};
-use nestrad_tests::solving::finish;
+use nestrad_tests::solving::{apart_percent, finish};
 
 type Fault = Box<dyn std::error::Error>;
 
@@ -97,19 +97,6 @@ fn by_particles(name: &'static str, soil_m: f64) -> Option<Case> {
         sky: None,
         judge: Box::new(judge),
     })
-}
-
-/// Rms over organs of how far absorbed powers per area lie apart, percent of the mean.
-fn apart_percent(a: &Solution, b: &Solution, band: usize) -> f64 {
-    let bands = a.balance.len();
-    let (mut area, mut mean, mut square) = (0.0, 0.0, 0.0);
-    for (organ, &own) in a.organ_area_m2.iter().enumerate() {
-        let [x, y] = [a, b].map(|s| &s.organs[organ * bands + band]);
-        area += own;
-        mean += y.absorbed_W;
-        square += (x.absorbed_W - y.absorbed_W).powi(2) / own;
-    }
-    100.0 * (square * area).sqrt() / mean
 }
 
 fn run(case: &Case, percent: f64, seed: u64) -> Result<String, Fault> {
