@@ -8,8 +8,10 @@
 
 pub mod cluster;
 pub mod direct;
+pub mod errors;
 pub mod exchange;
 pub mod far_field;
+mod heap;
 mod html;
 pub mod order;
 pub mod output;

@@ -7,12 +7,12 @@ use thiserror::Error;
 
 use crate::cluster::Cluster;
 use crate::direct::{Direct, direct_light};
+use crate::errors::{ErrorParts, OrganParts};
 use crate::exchange::{
     BlockOf, Exchange, ExchangeError, JobCounts, Outlook, Sampling, Traced, trace_here, trace_kept,
 };
 use crate::far_field::closure::{FarRows, from_layers};
 use crate::order::Ordered;
-use crate::output::errors::{ErrorParts, OrganParts};
 use crate::output::progress::{Cancelled, Progress};
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
@@ -285,13 +285,7 @@ fn sample_far(
     lit: impl Fn(usize) -> bool + Sync,
     progress: &Progress,
 ) -> Result<FarSample, ExchangeError> {
-    let by_lines = sampling.sets_per_batch > 0;
-    let few = Sampling {
-        batches: 2,
-        sets_per_batch: sampling.sets_per_batch.min(MOST_FAR_SETS),
-        least_samples: if by_lines { 0.0 } else { FAR_RAYS },
-        ..*sampling
-    };
+    let few = sampling.glance();
     let look = |radius_m: f64| {
         let world = World {
             radius_m,
@@ -307,10 +301,6 @@ fn sample_far(
         without_end: look(f64::INFINITY)?,
     })
 }
-
-/// Sets of axes of such a look, at most, and rays from a face where there are no lines.
-const MOST_FAR_SETS: u32 = 8;
-const FAR_RAYS: f64 = 8.0;
 
 /// Radiosities of what is not a row: dark, but for the unshaded soil beyond the map of an open scene and
 /// the far field's start.

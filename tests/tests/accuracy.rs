@@ -4,7 +4,7 @@
 
 use nestrad_common::generate::{Maize, Stand};
 use nestrad_common::problem::Problem;
-use nestrad_master::output::errors::organ_errors;
+use nestrad_master::errors::organ_errors;
 use nestrad_master::output::progress::Progress;
 use nestrad_master::output::resources::Stopwatch;
 use nestrad_master::plan::{Estimator, Settings};

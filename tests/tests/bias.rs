@@ -7,7 +7,7 @@ use std::num::NonZeroUsize;
 use nestrad_common::light::{Sky, SkyLight};
 use nestrad_common::options::Diameter;
 use nestrad_common::problem::Problem;
-use nestrad_master::output::errors::ErrorParts;
+use nestrad_master::errors::ErrorParts;
 use nestrad_master::plan::{Aims, Plan, Settings};
 use nestrad_master::run::Finished;
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};

@@ -310,7 +310,7 @@ impl Task {
             scene: inspection,
             plan: &computed.plan,
             energy_balance: &solution.balance,
-            error_estimates: &output::errors::organ_errors(scene, solution),
+            error_estimates: &nestrad_master::errors::organ_errors(scene, solution),
             counters: &computed.counters,
             stages: &[&computed.stages, watch.stages()].concat(),
             resources: usage,

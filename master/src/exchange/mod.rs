@@ -59,6 +59,21 @@ impl Sampling {
         0.5 * f64::from(directions) / self.line_area_m2
     }
 
+    /// A batch of each half alone, of few sets, without rays for what it meets too thinly: enough to compare two
+    /// models by the same lines.
+    pub fn glance(&self) -> Self {
+        Self {
+            batches: 2,
+            sets_per_batch: self.sets_per_batch.min(MOST_SETS_AT_A_GLANCE),
+            least_samples: if self.sets_per_batch > 0 {
+                0.0
+            } else {
+                RAYS_AT_A_GLANCE
+            },
+            ..*self
+        }
+    }
+
     /// Lines through an extent, in all directions together.
     pub fn lines(&self, extent: &Extent) -> f64 {
         let lattice = |lines: v1::Lines| {
@@ -94,6 +109,10 @@ impl Sampling {
             )
     }
 }
+
+const MOST_SETS_AT_A_GLANCE: u32 = 8;
+/// From each face in each half, where there are no lines.
+const RAYS_AT_A_GLANCE: f64 = 8.0;
 
 /// All batches, and what it took to trace them.
 #[derive(Clone, Debug, Default)]

@@ -8,7 +8,6 @@
 pub mod atomic;
 pub(crate) mod csv;
 mod error;
-pub mod errors;
 mod finite;
 pub(crate) mod number;
 mod parquet;

@@ -10,8 +10,8 @@ use std::io::{self, Write};
 
 use nestrad_common::scene::Scene;
 
-use super::errors::organ_errors;
 use super::resources::Usage;
+use crate::errors::organ_errors;
 use crate::solution::{Balance, Estimate, Solution};
 
 const COLUMNS: usize = 80;

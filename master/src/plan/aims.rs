@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::DEFAULT_ACCURACY_PERCENT;
 
-/// Errors that a plan is made for, percent, as [`crate::output::errors::ErrorParts`] has them; what a scene makes
+/// Errors that a plan is made for, percent, as [`crate::errors::ErrorParts`] has them; what a scene makes
 /// of them is known when it is solved.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Aims {
@@ -33,6 +33,11 @@ impl Aims {
             elements_percent: accuracy_percent
                 .min((DEFAULT_ACCURACY_PERCENT * accuracy_percent).sqrt()),
         }
+    }
+
+    /// Whether a smaller error of a built-in sky would be planned with no more directions.
+    pub fn has_most_sky_directions(&self) -> bool {
+        directions_for(0.0) == self.sky_directions()
     }
 
     /// Directions of a built-in sky.

@@ -5,6 +5,7 @@ use nestrad_common::problem::Problem;
 use serde::Serialize;
 
 use super::Plan;
+use crate::exchange::Sampling;
 use crate::solver::HALF_BATCHES;
 use crate::world::{SoilGrid, extent_of};
 
@@ -55,6 +56,15 @@ impl Memory {
             } else {
                 0.1 * rays
             };
+        // a finite sphere is judged by a glance, within it and without end
+        let glances = if plan.far_field.is_some() {
+            let few = sampling.glance();
+            let part = |s: &Sampling| f64::from(s.batches * s.sets_per_batch.max(1));
+            2.0 * part(&few) / part(sampling)
+        } else {
+            0.0
+        };
+        let entries = entries * (1.0 + glances);
         // a batch is held twice while it is sorted
         let transient = 2.0 * 4.0 * entries / f64::from(sampling.batches);
         Self {

@@ -68,7 +68,7 @@ fn exchange(settings: &Settings, plan: &Plan) -> String {
             "exchange: {} directions of lines {:.1} mm apart, for an accuracy of {} %",
             s.batches * s.sets_per_batch * s.axes.count(),
             1e3 * s.line_area_m2.sqrt(),
-            settings.accuracy_percent
+            (1e3 * plan.aims.exchange_percent).round() / 1e3
         ),
         Estimator::Rays => format!(
             "exchange: {} rays from every face, as asked",

@@ -23,8 +23,8 @@ pub use self::error::ReportError;
 use self::data::{Organ, OrganErrors, Results, Soil};
 use self::page::Blob;
 use self::profile::{LIT_STEP, Layer, Patch};
+use crate::errors::ErrorParts;
 use crate::output::atomic::Staging;
-use crate::output::errors::ErrorParts;
 use crate::output::{OutputError, REPORT};
 use crate::solution::Balance;
 

@@ -14,7 +14,7 @@ use nestrad_common::problem::Problem;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::output::errors::ErrorParts;
+use crate::errors::ErrorParts;
 use crate::output::progress::Progress;
 use crate::output::resources::Stopwatch;
 use crate::plan::{Aims, Plan, PlanError, Settings};
@@ -159,7 +159,7 @@ pub fn solve_in_rounds(
     let begun = Instant::now();
     let mut problem = Cow::Borrowed(problem);
     let asked = settings.accuracy_percent;
-    let mut aims = Aims::of(settings.budget_s.map_or(asked, |_| pilot(asked)));
+    let aims = Aims::of(settings.budget_s.map_or(asked, |_| pilot(asked)));
     let mut plan = Plan::aimed(&problem, settings, &aims)?;
     let mut rounds = Vec::new();
     let mut last: Option<Reached> = None;
@@ -181,12 +181,13 @@ pub fn solve_in_rounds(
         let took_s = round_begun.elapsed().as_secs_f64();
         let reached_percent = worst(&finished.errors).map(ErrorParts::total_percent);
         rounds.push(Round {
-            planned: aims,
+            planned: plan.aims,
             reached_percent,
         });
         let measured = Measured {
-            aims,
+            aims: plan.aims,
             errors: &finished.errors,
+            sky_is_fixed: sky.is_none() || plan.aims.has_most_sky_directions(),
             cost_s: next::cost_s(
                 &finished.counters,
                 problem.sky_directions,
@@ -212,7 +213,7 @@ pub fn solve_in_rounds(
                     .map_err(|_| Ended::NoFiner)?;
             }
             let plan = Plan::aimed(&lit, settings, &aims);
-            plan.map(|plan| (lit, aims, plan))
+            plan.map(|plan| (lit, plan))
                 .map_err(|_| Ended::BeyondLimits)
         });
         let reached = Reached {
@@ -228,7 +229,7 @@ pub fn solve_in_rounds(
         };
         match next {
             Ok(next) => {
-                (problem, aims, plan) = next;
+                (problem, plan) = next;
                 last = Some(reached);
             }
             Err(_) => return Ok(reached),

@@ -4,7 +4,7 @@
 //! the square. The least cost of a sum of squares then gives each part a share of the square that goes with the
 //! root of its cost times its error (Lagrange).
 
-use crate::output::errors::ErrorParts;
+use crate::errors::ErrorParts;
 use crate::plan::{Aims, COARSEST_EXCHANGE_PERCENT};
 use crate::run::Counters;
 
@@ -21,6 +21,8 @@ pub(super) struct Measured<'a> {
     pub(super) aims: Aims,
     /// What came of it, by band.
     pub(super) errors: &'a [ErrorParts],
+    /// Whether there are no more directions of the sky to be had.
+    pub(super) sky_is_fixed: bool,
     /// What each part took, roughly, s.
     pub(super) cost_s: PerPart,
 }
@@ -62,16 +64,13 @@ impl Measured<'_> {
         // each band in turn, while it is the worst
         for _ in 0..2 * self.errors.len() {
             let total = |parts: &ErrorParts| {
-                square(&scaled(parts, &scale))
-                    .sqrt()
-                    .hypot(parts.far_field_percent)
+                (square(&self.scaled(parts, &scale)) + self.fixed_square(parts)).sqrt()
                     + parts.solver_percent
             };
             let by_total = |a: &&ErrorParts, b: &&ErrorParts| total(a).total_cmp(&total(b));
             let worst = self.errors.iter().max_by(by_total)?;
-            let parts = scaled(worst, &scale);
-            let left =
-                (aimed - worst.solver_percent).max(0.0).powi(2) - worst.far_field_percent.powi(2);
+            let parts = self.scaled(worst, &scale);
+            let left = (aimed - worst.solver_percent).max(0.0).powi(2) - self.fixed_square(worst);
             if left <= LEAST_LEFT * aimed * aimed {
                 return None;
             }
@@ -82,6 +81,31 @@ impl Measured<'_> {
             scale = std::array::from_fn(|k| scale[k] * factors[k]);
         }
         Some(scale.map(|s| s.max(1.0 / MOST_FINER)))
+    }
+
+    /// The parts that can be planned for, so much smaller.
+    fn scaled(&self, parts: &ErrorParts, scale: &PerPart) -> PerPart {
+        let percent = [
+            parts.exchange_percent,
+            parts.direct_percent,
+            if self.sky_is_fixed {
+                0.0
+            } else {
+                parts.sky_percent
+            },
+            parts.elements_percent,
+        ];
+        std::array::from_fn(|k| percent[k] * scale[k])
+    }
+
+    /// The square of what cannot.
+    fn fixed_square(&self, parts: &ErrorParts) -> f64 {
+        let sky = if self.sky_is_fixed {
+            parts.sky_percent
+        } else {
+            0.0
+        };
+        sky * sky + parts.far_field_percent * parts.far_field_percent
     }
 
     /// The same where only so much time is left, when the last round took `took_s`; none where what fits would
@@ -129,16 +153,6 @@ impl Measured<'_> {
 
 /// A round that goes less than this part of the way is not worth its time.
 const HARDLY: f64 = 0.2;
-
-fn scaled(parts: &ErrorParts, scale: &PerPart) -> PerPart {
-    let percent = [
-        parts.exchange_percent,
-        parts.direct_percent,
-        parts.sky_percent,
-        parts.elements_percent,
-    ];
-    std::array::from_fn(|k| percent[k] * scale[k])
-}
 
 fn square(parts: &PerPart) -> f64 {
     parts.iter().map(|p| p * p).sum()
@@ -191,6 +205,7 @@ mod tests {
         Measured {
             aims: Aims::of(0.5),
             errors,
+            sky_is_fixed: false,
             cost_s: [1.0, 0.5, 0.0, 0.5],
         }
     }
@@ -200,7 +215,7 @@ mod tests {
         let errors = [parts([0.2, 0.9, 0.0, 0.1]), parts([0.8, 0.1, 0.0, 0.9])];
         let finer = measured(&errors).finer(0.5).unwrap();
         for band in &errors {
-            let square = square(&scaled(band, &finer));
+            let square = square(&measured(&errors).scaled(band, &finer));
             assert!(square <= 0.45_f64.powi(2) * 1.000_001, "{square} {finer:?}");
         }
         assert!(finer.iter().all(|&s| s <= 1.0), "{finer:?}");
@@ -230,6 +245,18 @@ mod tests {
             ..parts([0.1; 4])
         };
         assert_eq!(measured(&[parts([0.6; 4]), far]).finer(2.0), None);
+    }
+
+    #[test]
+    fn a_sky_that_has_no_more_directions_is_not_chased() {
+        let errors = [parts([0.9, 0.0, 0.5, 0.0])];
+        let mut measured = measured(&errors);
+        assert!(measured.finer(0.5).is_some_and(|finer| finer[2] < 1.0));
+        measured.sky_is_fixed = true;
+        assert_eq!(measured.finer(0.5), None);
+        // what it leaves is for the others
+        let finer = measured.finer(1.0).unwrap();
+        assert!(finer[0] < 1.0 && finer[2] == 1.0, "{finer:?}");
     }
 
     #[test]

@@ -7,11 +7,11 @@ use std::sync::Arc;
 use rayon::ThreadPool;
 use thiserror::Error;
 
-use super::heap::Freed;
 use super::metrics::Metrics;
 use super::outcome::Outcome;
 use super::scenes::HeldScene;
 use super::solves::{Job, Solves, State};
+use crate::heap::Freed;
 use crate::output::resources::Stopwatch;
 use crate::plan::Plan;
 use crate::rounds::{Round, RoundsError, solve_in_rounds};

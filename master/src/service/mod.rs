@@ -8,7 +8,6 @@ mod budget;
 mod compute;
 mod connection;
 mod error;
-pub(crate) mod heap;
 mod identity;
 mod intake;
 mod metrics;

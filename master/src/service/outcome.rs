@@ -4,7 +4,7 @@ use nestrad_common::scene::Organ;
 use nestrad_proto::v1;
 
 use super::scenes::HeldScene;
-use crate::output::errors::organ_errors;
+use crate::errors::organ_errors;
 use crate::output::resources::{Stage, Usage};
 use crate::rounds::Reached;
 use crate::run::Finished;

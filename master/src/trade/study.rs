@@ -15,12 +15,12 @@ use super::ledger::Ledger;
 use super::measure::Reference;
 use super::pace::Pace;
 use super::setting::{Factors, Setting};
-use crate::output::errors::ErrorParts;
+use crate::errors::ErrorParts;
+use crate::heap::Freed;
 use crate::output::progress::Progress;
 use crate::output::resources::{Stage, Stopwatch, forget_peak_memory};
 use crate::plan::{Aims, Plan, PlanError};
 use crate::run::{Finished, RunError, solve};
-use crate::service::heap::Freed;
 use crate::world::is_soil;
 
 /// What to study.

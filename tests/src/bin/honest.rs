@@ -12,7 +12,7 @@ use std::fs;
 use nestrad_common::generate::{LeafAngles, Maize, Stand};
 use nestrad_common::light::{Sky, SkyLight};
 use nestrad_common::problem::Problem;
-use nestrad_master::output::errors::organ_errors;
+use nestrad_master::errors::organ_errors;
 use nestrad_master::output::progress::Progress;
 use nestrad_master::output::resources::Stopwatch;
 use nestrad_master::plan::{Aims, Estimator, Plan, Settings};
