@@ -9,7 +9,9 @@ which gives the same numbers.
 import argparse
 import csv
 import os
+import signal
 import sys
+import threading
 from pathlib import Path
 
 import grpc
@@ -106,8 +108,19 @@ def write_files(folder, geometry, hours):
         (folder / f"scene-{hour}.toml").write_text("".join(text))
 
 
+INTERRUPTED = threading.Event()
+
+
+def interrupt(*_):
+    """Python drops an interrupt that comes while gRPC is in a callback: `say` looks again."""
+    INTERRUPTED.set()
+    raise KeyboardInterrupt
+
+
 def say(now):
     """Progress on stderr."""
+    if INTERRUPTED.is_set():
+        raise KeyboardInterrupt
     for line in now.plan:
         print(f"  {line}", file=sys.stderr)
     if now.stage:
@@ -162,6 +175,7 @@ def main():
 
 
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, interrupt)
     try:
         main()
     except KeyboardInterrupt:

@@ -85,7 +85,7 @@ fn a_crop_model_in_python_gets_the_numbers_of_the_command_line() {
         "--out",
         "absorbed.csv",
     ]);
-    python.args(["--files", "files", "--accuracy", "2"]);
+    python.args(["--files", "files", "--accuracy", "0.25"]);
     let ran = finish(python);
     assert!(!ran.status.success());
     assert!(
@@ -102,7 +102,7 @@ fn a_crop_model_in_python_gets_the_numbers_of_the_command_line() {
         "--out",
         "absorbed.csv",
     ]);
-    python.args(["--files", "files", "--accuracy", "2"]);
+    python.args(["--files", "files", "--accuracy", "0.25"]);
     let ran = finish(python);
     assert!(ran.status.success(), "{}", said(&ran));
     for part in ["exchange: ", "exchange ", "solve "] {
@@ -117,7 +117,7 @@ fn a_crop_model_in_python_gets_the_numbers_of_the_command_line() {
     let text = std::fs::read_to_string(desk.path("absorbed.csv")).unwrap();
     for hour in ["0", "1"] {
         let scene = format!("files/scene-{hour}.toml");
-        desk.done(&["solve", &scene, "--accuracy", "2", "--out", "out"]);
+        desk.done(&["solve", &scene, "--accuracy", "0.25", "--out", "out"]);
         let organs = std::fs::read_to_string(desk.path("out/organs.csv")).unwrap();
         let (there, here) = (absorbed_W(&text, hour), absorbed_W(&organs, hour));
         assert_eq!((there.len(), here.len()), (160, 160));
