@@ -70,8 +70,7 @@ impl Elements {
 }
 
 fn divisions(triangle: &[DVec3; 3], max_edge_m: f64) -> u32 {
-    let [a, b, c] = triangle;
-    let longest = a.distance(*b).max(b.distance(*c)).max(c.distance(*a));
+    let longest = geometry::longest_edge(triangle);
     // pieces are as slender as the triangle, so a slender one would have far more than its area needs
     let by_area = (MOST_PIECES * geometry::area(triangle)).sqrt() / max_edge_m;
     let n = (longest / max_edge_m).min(by_area).ceil();

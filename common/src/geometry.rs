@@ -12,6 +12,11 @@ pub fn area(triangle: &[DVec3; 3]) -> f64 {
     0.5 * doubled_area_vector(triangle).length()
 }
 
+/// Length of the longest edge, m.
+pub fn longest_edge([a, b, c]: &[DVec3; 3]) -> f64 {
+    a.distance(*b).max(b.distance(*c)).max(c.distance(*a))
+}
+
 /// Axis-aligned bounds of a set of points; `None` when there are none.
 pub fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Option<(DVec3, DVec3)> {
     points.into_iter().fold(None, |acc, &p| match acc {

@@ -2,15 +2,15 @@
 
 #![allow(clippy::unwrap_used)]
 
-use nestrad_common::generate::{Maize, Stand};
+use nestrad_common::generate::{LeafAngles, Maize, Stand};
 use nestrad_common::problem::Problem;
 use nestrad_master::errors::organ_errors;
 use nestrad_master::output::progress::Progress;
 use nestrad_master::output::resources::Stopwatch;
-use nestrad_master::plan::{Estimator, Settings};
+use nestrad_master::plan::{Aims, Estimator, Plan, Settings};
 use nestrad_master::rounds::{Ended, Reached, solve_in_rounds};
 use nestrad_master::run::Means;
-use nestrad_tests::canopies::{par_and_nir, problem, uniform_sky};
+use nestrad_tests::canopies::{par_and_nir, problem, small_leaves, uniform_sky};
 use nestrad_tests::solving::{apart_percent, plan, solve};
 
 fn reach(problem: &Problem, settings: &Settings) -> Reached {
@@ -139,4 +139,25 @@ fn the_dark_has_no_error() {
     let reached = reach(&problem, &Settings::default());
     assert_eq!(reached.accuracy.ended, Ended::Reached);
     assert!(reached.accuracy.errors.is_empty());
+}
+
+/// Flat leaves need no small elements: a plan for what was asked for would have most of its cost in them.
+#[test]
+fn a_coarse_look_comes_first_where_it_saves() {
+    let leaves = small_leaves(2.0, LeafAngles::Spherical, 0.0025, 4);
+    let problem = problem(&leaves, &par_and_nir(), uniform_sky(46, 2));
+    let reached = reach(&problem, &asked(1.0));
+    let accuracy = &reached.accuracy;
+    assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
+    assert_eq!(accuracy.rounds[0].planned, Aims::pilot(1.0), "{accuracy:?}");
+    let elements = |aims: &Aims| aims.elements_percent;
+    let (own, without) = (elements(&reached.plan.aims), elements(&Aims::of(1.0)));
+    assert!(own > without, "{own} {without}");
+    // it needs less memory than it would be planned with
+    let little = Settings {
+        memory_GiB: 0.8 * plan(&problem, &asked(1.0)).memory.total_GiB(),
+        ..asked(1.0)
+    };
+    assert!(Plan::new(&problem, &little).is_err());
+    assert_eq!(reach(&problem, &little).accuracy.ended, Ended::Reached);
 }

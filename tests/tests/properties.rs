@@ -228,7 +228,7 @@ fn light_of_two_sources_adds_up() {
             sky_directions: 0,
             ..problem.clone()
         };
-        solve(&part, &coarse()).solution
+        solve(&part, &Settings::default()).solution
     };
     let both = with(problem.sources.clone());
     let (sun, sky) = (with(vec![sun.clone()]), with(sky.to_vec()));

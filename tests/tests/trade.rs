@@ -8,8 +8,9 @@
 
 use nestrad_common::options::Diameter;
 use nestrad_master::output::progress::Progress;
+use nestrad_master::trade::request::Request;
 use nestrad_master::trade::setting::{Setting, grid};
-use nestrad_master::trade::study::{Request, run};
+use nestrad_master::trade::study::run;
 use nestrad_master::trade::table::Comparison;
 use nestrad_master::trade::{About, write};
 use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
@@ -18,7 +19,7 @@ use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
 fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
     let problem = problem(&small_maize(), &par_and_nir(), uniform_sky(46, 2));
     let folder = tempfile::tempdir().unwrap();
-    let settings = [5.0, 0.7, 0.35].map(|a| Setting::planned(a, Diameter::Infinite));
+    let settings = [5.0, 0.7, 0.35].map(Setting::asked);
     let request = Request {
         problem: &problem,
         sky: None,
@@ -69,7 +70,7 @@ fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
 }
 
 #[test]
-fn a_grid_has_no_plan_twice_and_nothing_far_finer_than_its_finest_target() {
+fn a_grid_has_nothing_far_finer_than_its_finest_target() {
     let problem = problem(&small_maize(), &par_and_nir(), uniform_sky(46, 2));
     let settings = grid(&problem, 2.0);
     assert!(

@@ -104,8 +104,18 @@ impl Block {
         let mut divisions = Vec::with_capacity(count);
 
         let mut first = Vec::with_capacity(count + 1);
-        let (mut seen_as, mut solid, mut area_m2, mut row) =
-            (Vec::new(), Vec::new(), Vec::new(), Vec::new());
+        let pieces = |run: &v1::TriangleRun| {
+            u64::from(run.triangles).saturating_mul(u64::from(run.divisions).pow(2))
+        };
+        let elements = block.runs.iter().map(pieces).fold(0, u64::saturating_add);
+        require(elements <= u64::from(world.elements), "elements")?;
+        let elements = elements as usize;
+        let (mut solid, mut area_m2) = (Vec::with_capacity(elements), Vec::with_capacity(elements));
+        let local_ends = 2 * elements + ends.len() - ends.faces() as usize;
+        let (mut seen_as, mut row) = (
+            Vec::with_capacity(local_ends),
+            Vec::with_capacity(local_ends),
+        );
         let mut rows = 0;
         let mut next = 0u32;
         for run in &block.runs {
@@ -172,10 +182,13 @@ impl Block {
             row,
             rows: rows as usize,
         };
-        block.cut_by_soil = (0..count)
-            .flat_map(|t| (block.first[t]..block.first[t + 1]).map(move |local| (t, local)))
-            .map(|(t, local)| matches!(block.above_soil(t, local), Above::Part(_)))
-            .collect();
+        let mut cut_by_soil = vec![false; elements];
+        for t in 0..count {
+            for local in block.first[t]..block.first[t + 1] {
+                cut_by_soil[local as usize] = matches!(block.above_soil(t, local), Above::Part(_));
+            }
+        }
+        block.cut_by_soil = cut_by_soil;
         Ok(block)
     }
 

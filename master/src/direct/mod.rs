@@ -194,7 +194,7 @@ const COARSEST_OF_MANY: f64 = 16.0;
 const MOST_TIMES: f64 = 8.0;
 
 /// No source is drawn with lines coarser than this many times those of the strongest.
-const COARSEST: f64 = 4.0;
+const COARSEST: f64 = 16.0;
 
 /// No source is drawn with fewer points on the ground than this, however low it stands.
 const FEWEST_POINTS: f64 = 1e3;

@@ -21,6 +21,10 @@ pub struct Aims {
     pub elements_percent: f64,
 }
 
+/// Edges of elements are neither shorter nor longer than this many times those at the default accuracy.
+const FINEST: f64 = 0.05;
+const COARSEST: f64 = 4.0;
+
 impl Aims {
     /// For an accuracy of which nothing else is known.
     pub fn of(accuracy_percent: f64) -> Self {
@@ -35,6 +39,31 @@ impl Aims {
         }
     }
 
+    /// A coarse look at a scene, to plan by what it measures; not finer than what is asked for.
+    pub fn pilot(asked_percent: f64) -> Self {
+        let asked = Self::of(asked_percent);
+        Self {
+            exchange_percent: asked.exchange_percent.max(2.0),
+            direct_percent: asked.direct_percent.max(2.0),
+            sky_percent: asked.sky_percent.max(1.0),
+            elements_percent: asked.elements_percent.max(2.0),
+        }
+    }
+
+    /// Edges of elements, in parts of those at the default accuracy.
+    pub(super) fn coarser_elements(&self) -> f64 {
+        (self.elements_percent / DEFAULT_ACCURACY_PERCENT).clamp(FINEST, COARSEST)
+    }
+
+    /// The same, where edges are not longer than so many times those at the default accuracy.
+    pub(super) fn with_elements_at_most(self, coarser: f64) -> Self {
+        let most = DEFAULT_ACCURACY_PERCENT * coarser.clamp(FINEST, COARSEST);
+        Self {
+            elements_percent: self.elements_percent.min(most),
+            ..self
+        }
+    }
+
     /// Whether a smaller error of a built-in sky would be planned with no more directions.
     pub fn has_most_sky_directions(&self) -> bool {
         directions_for(0.0) == self.sky_directions()
@@ -43,5 +72,27 @@ impl Aims {
     /// Directions of a built-in sky.
     pub fn sky_directions(&self) -> NonZeroUsize {
         directions_for(self.sky_percent)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pilot_is_coarse_and_not_finer_than_what_is_asked_for() {
+        for asked in [0.1, 1.0, 5.0] {
+            let (pilot, aims) = (Aims::pilot(asked), Aims::of(asked));
+            assert!(pilot.exchange_percent >= aims.exchange_percent.max(2.0));
+            assert!(pilot.elements_percent >= aims.elements_percent.max(2.0));
+        }
+    }
+
+    #[test]
+    fn triangles_that_are_not_cut_are_elements_of_their_own_size() {
+        let coarse = Aims::of(2.0);
+        let uncut = coarse.with_elements_at_most(1.0);
+        assert_eq!(uncut.elements_percent, DEFAULT_ACCURACY_PERCENT);
+        assert_eq!(coarse.with_elements_at_most(1e9), coarse);
     }
 }

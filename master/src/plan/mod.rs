@@ -2,14 +2,16 @@
 //! nothing.
 
 mod aims;
+mod counts;
 mod limits;
 mod memory;
 mod reasons;
+mod sampling;
 mod scale;
 
 use std::fmt;
 
-use nestrad_common::directions::Axes;
+use nestrad_common::elements::Elements;
 use nestrad_common::options::Diameter;
 use nestrad_common::problem::Problem;
 use serde::Serialize;
@@ -18,9 +20,10 @@ use thiserror::Error;
 use crate::direct;
 use crate::exchange::Sampling;
 use crate::far_field::closure::Resolution;
-use crate::solver::{HALF_BATCHES, Tolerance};
+use crate::solver::Tolerance;
 use crate::world::{World, extent_of};
 pub use aims::Aims;
+pub use counts::Counts;
 pub use memory::Memory;
 pub use scale::Scale;
 
@@ -31,7 +34,8 @@ pub struct Settings {
     pub diameter: Diameter,
     /// Standard error to aim at: rms over organs, in percent of the mean absorbed power per area.
     pub accuracy_percent: f64,
-    /// Whether finer rounds follow where the first one misses the accuracy; it is sure to be asked for then.
+    /// Whether there are rounds until that is reached. Without them the plan depends on the scene alone, so that the
+    /// exchange of one solve serves another under other lights.
     pub in_rounds: bool,
     /// Seconds that the solve may take; what is reached by then has to do. Results then depend on how fast the
     /// machine is.
@@ -203,8 +207,17 @@ impl Plan {
         let scattering_bands: Vec<usize> = (0..problem.bands.len())
             .filter(|&b| lit(b) && !problem.bands[b].is_black(has_soil))
             .collect();
-        let sampling =
-            (!scattering_bands.is_empty()).then(|| sampling(problem, &scale, settings, aims));
+        let organ_m = match scale.organ_area_m2 {
+            0.0 => f64::INFINITY,
+            area => area.sqrt(),
+        };
+        let edge_m = (EDGE * organ_m)
+            .min((scale.ground_area_m2 / 1000.0).sqrt())
+            .max(f64::MIN_POSITIVE);
+        let coarser = aims.coarser_elements();
+        let elements = Elements::count(&problem.scene, edge_m * coarser);
+        let sampling = (!scattering_bands.is_empty())
+            .then(|| sampling::lines(problem, &scale, elements, settings, aims));
         // an open scene has no layers that go on for ever; its exchange is full
         let radius_m = match settings.diameter {
             Diameter::Metres(d) if problem.scene.pattern.is_some() => Some(0.5 * d),
@@ -215,15 +228,8 @@ impl Plan {
             radius_m.filter(|&r| sampling.is_some_and(|s| r < s.longest_sight_m(scale.height_m)));
         let finer = aims.exchange_percent / DEFAULT_ACCURACY_PERCENT;
         let of_direct = aims.direct_percent / DEFAULT_ACCURACY_PERCENT;
-        let organ_m = match scale.organ_area_m2 {
-            0.0 => f64::INFINITY,
-            area => area.sqrt(),
-        };
-        let max_edge_m = (EDGE * organ_m)
-            .min((scale.ground_area_m2 / 1000.0).sqrt())
-            .max(f64::MIN_POSITIVE)
-            .min(radius_m.map_or(f64::INFINITY, |r| r.max(organ_m / FINEST_CUT)))
-            * (aims.elements_percent / DEFAULT_ACCURACY_PERCENT).clamp(0.05, 4.0);
+        let edge_m = edge_m.min(radius_m.map_or(f64::INFINITY, |r| r.max(organ_m / FINEST_CUT)));
+        let max_edge_m = edge_m * coarser;
         let soil_cell_m = (0.2 * organ_m).clamp(
             (scale.ground_area_m2 / MOST_SOIL_CELLS).sqrt(),
             (scale.ground_area_m2 / LEAST_SOIL_CELLS)
@@ -231,7 +237,7 @@ impl Plan {
                 .max(f64::MIN_POSITIVE),
         );
         // points on the outline of an organ: see `spread_effort`
-        let direct_line_area_m2 = (scale.organ_area_m2 / 11_000.0 * of_direct.powf(4.0 / 3.0))
+        let direct_line_area_m2 = (scale.organ_area_m2 / 8_000.0 * of_direct.powf(4.0 / 3.0))
             .min(scale.triangle_area_m2 / 4.0)
             .min(max_edge_m * max_edge_m / EDGE_SQUARED_IN_POINTS)
             .clamp(
@@ -240,12 +246,13 @@ impl Plan {
             )
             .max(f64::MIN_POSITIVE);
         let plan = Self {
-            aims: *aims,
+            // what is not cut is as good as cut to its size
+            aims: aims.with_elements_at_most(scale.triangle_edge_m / edge_m),
             scale,
             max_edge_m,
             soil_cell_m,
             radius_m,
-            far_field: radius_m.map(|_| far_field(settings, finer)),
+            far_field: radius_m.map(|_| sampling::far_field(settings, finer)),
             sampling,
             direct_line_area_m2,
             seed: settings.seed,
@@ -317,7 +324,7 @@ const LEAST_SOIL_CELLS: f64 = 64.0;
 /// of leaf per square metre asks for. What is too small for them is probed with rays.
 fn most_points(problem: &Problem, finer: f64) -> f64 {
     let scene = &problem.scene;
-    let of_organs = 11_000.0 * scene.organs.len() as f64 / finer.powf(4.0 / 3.0);
+    let of_organs = 8_000.0 * scene.organs.len() as f64 / finer.powf(4.0 / 3.0);
     (1e6 + 10.0 * (of_organs + 4.0 * scene.triangles.len() as f64)).min(MOST_DIRECT_LINES)
 }
 
@@ -326,52 +333,3 @@ const MOST_DIRECT_LINES: f64 = 3e8;
 
 /// An element of full size is met by half as many points as this, so that it is lit as it should be.
 const EDGE_SQUARED_IN_POINTS: f64 = 32.0;
-
-/// Lines of a direction, at most: some, and what the leaves of a canopy of a tenth of a square metre of
-/// leaf per square metre ask for. Where leaves are fewer still, most lines would meet none of them.
-const LINES_ANYWHERE: f64 = 1e5;
-const LINES_PER_ORGAN: f64 = 1500.0;
-const LINES_PER_TRIANGLE: f64 = 3.0;
-
-/// How the exchange is sampled for an accuracy.
-///
-/// The error of an organ falls with the root of the number of directions; lines beyond some 75 per
-/// organ and direction hardly help (both measured: see `master/docs/accuracy.md`). 16 batches of 2
-/// sets of 16 axes give 0.3 to 0.45 % in NIR.
-fn sampling(problem: &Problem, scale: &Scale, settings: &Settings, aims: &Aims) -> Sampling {
-    let finer = aims.exchange_percent / DEFAULT_ACCURACY_PERCENT;
-    let (sets_per_batch, least_samples) = match settings.estimator {
-        Estimator::Lines => ((2.0 / (finer * finer)).round().max(1.0) as u32, 4.0),
-        Estimator::Rays => (0, (RAYS / (finer * finer)).round().clamp(8.0, 1e6)),
-    };
-    let scene = &problem.scene;
-    let most_lines = LINES_ANYWHERE
-        + LINES_PER_ORGAN * scene.organs.len() as f64
-        + LINES_PER_TRIANGLE * scene.triangles.len() as f64;
-    Sampling {
-        batches: 2 * HALF_BATCHES as u32,
-        axes: Axes::Both,
-        sets_per_batch,
-        line_area_m2: (scale.organ_area_m2 / 150.0)
-            .min(4.5 * scale.triangle_area_m2)
-            .min(scale.ground_area_m2 / 1000.0)
-            .max(scale.ground_area_m2 / most_lines)
-            .max(f64::MIN_POSITIVE),
-        least_samples,
-        seed: settings.seed,
-    }
-}
-
-/// Rays from each face in each half, at the default accuracy.
-const RAYS: f64 = 64.0;
-
-fn far_field(settings: &Settings, finer: f64) -> Resolution {
-    let more = 1.0 / (finer * finer);
-    Resolution {
-        levels: 65,
-        bins: 6,
-        sets_per_batch: (2.0 * more).round().clamp(1.0, 32.0) as u32,
-        lines: (24_000.0 * more).clamp(1e4, 1e6) as u32,
-        seed: settings.seed,
-    }
-}

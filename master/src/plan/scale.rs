@@ -21,6 +21,8 @@ pub struct Scale {
     pub organ_area_m2: f64,
     /// Area of the triangle that a point of the canopy belongs to, on average, m².
     pub triangle_area_m2: f64,
+    /// Longest edge of that triangle, on average, m.
+    pub triangle_edge_m: f64,
 }
 
 impl Scale {
@@ -30,16 +32,21 @@ impl Scale {
         let soil = is_soil(scene);
         let only_soil = soil.iter().all(|&s| s);
         // summed by size, so that the order of the input leaves no trace in the rounding
-        let mut areas: Vec<(f64, u32)> = (0..scene.triangles.len())
+        let mut areas: Vec<(f64, f64, u32)> = (0..scene.triangles.len())
             .filter(|&t| only_soil || !soil[t])
-            .map(|t| (geometry::area(&scene.triangles[t]), scene.organ[t]))
+            .map(|t| {
+                let triangle = &scene.triangles[t];
+                let edge_m = geometry::longest_edge(triangle);
+                (geometry::area(triangle), edge_m, scene.organ[t])
+            })
             .collect();
-        areas.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
-        let (mut area, mut triangle_squares) = (0.0, 0.0);
+        areas.par_sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));
+        let (mut area, mut triangle_squares, mut edges) = (0.0, 0.0, 0.0);
         let mut organs = vec![0.0; scene.organs.len()];
-        for (a, organ) in areas {
+        for (a, edge_m, organ) in areas {
             area += a;
             triangle_squares += a * a;
+            edges += a * edge_m;
             organs[organ as usize] += a;
         }
         organs.sort_unstable_by(f64::total_cmp);
@@ -57,6 +64,7 @@ impl Scale {
             height_m: highest.z - lowest.z,
             organ_area_m2: mean(organs.iter().map(|a| a * a).sum()),
             triangle_area_m2: mean(triangle_squares),
+            triangle_edge_m: mean(edges),
         }
     }
 }

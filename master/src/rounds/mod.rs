@@ -1,9 +1,11 @@
 //! Solves in rounds until the error that was asked for is reached.
 //!
-//! The first round is planned for what was asked, and is the only one where nothing was. Where its own errors say
-//! that it missed, or where time is short, the next is planned by what the last one measured (`next.rs`).
+//! The first round is planned for what was asked, and is the only one where nothing was; or it is a coarse look,
+//! where that costs little beside it or where time is short. Where its own errors say that it missed, the next is
+//! planned by what the last one measured (`next.rs`).
 
 mod next;
+mod work;
 
 use std::borrow::Cow;
 use std::fmt;
@@ -17,9 +19,10 @@ use thiserror::Error;
 use crate::errors::ErrorParts;
 use crate::output::progress::Progress;
 use crate::output::resources::Stopwatch;
-use crate::plan::{Aims, Plan, PlanError, Settings};
+use crate::plan::{Aims, Counts, Plan, PlanError, Settings};
 use crate::run::{Finished, Means, RunError, solve_with};
 use next::Measured;
+use work::work_s;
 
 /// The last round, and how it came to it.
 #[derive(Clone, Debug)]
@@ -141,6 +144,9 @@ pub enum RoundsError {
     Run(#[from] RunError),
 }
 
+/// A coarse look comes first where it takes less than this part of what is planned without one.
+const WORTH_A_LOOK: f64 = 0.5;
+
 /// Never more rounds than this.
 const MOST_ROUNDS: usize = 5;
 
@@ -159,8 +165,37 @@ pub fn solve_in_rounds(
     let begun = Instant::now();
     let mut problem = Cow::Borrowed(problem);
     let asked = settings.accuracy_percent;
-    let aims = Aims::of(settings.budget_s.map_or(asked, |_| pilot(asked)));
-    let mut plan = Plan::aimed(&problem, settings, &aims)?;
+    let lit = |problem: &Problem, aims: &Aims| {
+        let mut problem = problem.clone();
+        if let Some(sky) = sky {
+            // the same sky, as it was checked before
+            let directions = aims.sky_directions();
+            problem.light_by(sky, directions, settings.seed).ok()?;
+        }
+        Some(problem)
+    };
+    let pilot = Aims::pilot(asked);
+    let coarse = settings.in_rounds.then(|| lit(&problem, &pilot)).flatten();
+    let coarse = coarse.and_then(|coarse| {
+        let plan = Plan::aimed(&coarse, settings, &pilot).ok()?;
+        Some((coarse, plan))
+    });
+    let all_s = |problem, plan| work_s(&Counts::of(problem, plan)).iter().sum::<f64>();
+    let mut plan = match (Plan::new(&problem, settings), coarse) {
+        (Ok(plan), Some((coarse, pilot)))
+            if settings.budget_s.is_some()
+                || all_s(&coarse, &pilot) < WORTH_A_LOOK * all_s(&problem, &plan) =>
+        {
+            problem = Cow::Owned(coarse);
+            pilot
+        }
+        // it may not need as much as it was planned with
+        (Err(PlanError::Memory { .. } | PlanError::Elements { .. }), Some((coarse, pilot))) => {
+            problem = Cow::Owned(coarse);
+            pilot
+        }
+        (plan, _) => plan?,
+    };
     let mut rounds = Vec::new();
     let mut last: Option<Reached> = None;
     loop {
@@ -188,11 +223,7 @@ pub fn solve_in_rounds(
             aims: plan.aims,
             errors: &finished.errors,
             sky_is_fixed: sky.is_none() || plan.aims.has_most_sky_directions(),
-            cost_s: next::cost_s(
-                &finished.counters,
-                problem.sky_directions,
-                problem.scene.triangles.len(),
-            ),
+            cost_s: work_s(&Counts::of(&problem, &plan)),
         };
         let left_s = settings.budget_s.map(|s| s - begun.elapsed().as_secs_f64());
         let next = if reached_percent.is_none_or(|reached| reached <= asked) {
@@ -205,15 +236,13 @@ pub fn solve_in_rounds(
             following(&measured, asked, left_s.map(|left_s| (took_s, left_s)))
         };
         let next = next.and_then(|aims| {
-            let mut lit = problem.clone();
-            if let Some(sky) = sky.filter(|_| aims.sky_percent < plan.aims.sky_percent) {
-                // the same sky, as it was checked before
-                lit.to_mut()
-                    .light_by(sky, aims.sky_directions(), settings.seed)
-                    .map_err(|_| Ended::NoFiner)?;
-            }
-            let plan = Plan::aimed(&lit, settings, &aims);
-            plan.map(|plan| (lit, plan))
+            let problem = if aims.sky_percent < plan.aims.sky_percent {
+                Cow::Owned(lit(&problem, &aims).ok_or(Ended::NoFiner)?)
+            } else {
+                problem.clone()
+            };
+            let plan = Plan::aimed(&problem, settings, &aims);
+            plan.map(|plan| (problem, plan))
                 .map_err(|_| Ended::BeyondLimits)
         });
         let reached = Reached {
@@ -260,19 +289,9 @@ fn worst(errors: &[ErrorParts]) -> Option<&ErrorParts> {
     errors.iter().max_by(by_total)
 }
 
-/// What a first round is planned for that is to tell how long things take.
-fn pilot(asked: f64) -> f64 {
-    asked.max((4.0 * asked).min(2.0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn a_pilot_is_coarser_than_what_is_asked_for_or_as_coarse() {
-        assert_eq!([0.1, 0.5, 1.0, 5.0].map(pilot), [0.4, 2.0, 2.0, 5.0]);
-    }
 
     #[test]
     fn the_band_with_the_largest_error_counts() {

@@ -4,15 +4,9 @@
 //! the square. The least cost of a sum of squares then gives each part a share of the square that goes with the
 //! root of its cost times its error (Lagrange).
 
+use super::work::{PARTS, PerPart};
 use crate::errors::ErrorParts;
 use crate::plan::{Aims, COARSEST_EXCHANGE_PERCENT};
-use crate::run::Counters;
-
-/// Parts that can be planned for: exchange, direct light, directions of a sky, elements.
-const PARTS: usize = 4;
-
-/// A number for each of them.
-type PerPart = [f64; PARTS];
 
 /// A round, as the next one is planned from it.
 #[derive(Clone, Copy, Debug)]
@@ -27,29 +21,11 @@ pub(super) struct Measured<'a> {
     pub(super) cost_s: PerPart,
 }
 
-/// Rough times of one core, ns: only their ratios matter. They are counts times constants, not clocks, so that
-/// the next round is the same on any machine.
-const ROW_ENTRY_NS: f64 = 60.0;
-const DIRECT_LINE_NS: f64 = 15.0;
-const DRAWN_TRIANGLE_NS: f64 = 40.0;
-const ELEMENT_NS: f64 = 5000.0;
-
-/// What the parts of a solve cost, s.
-pub(super) fn cost_s(counters: &Counters, sky_directions: usize, triangles: usize) -> PerPart {
-    [
-        counters.exchange.row_entries as f64 * ROW_ENTRY_NS,
-        counters.direct_lines as f64 * DIRECT_LINE_NS,
-        sky_directions as f64 * triangles as f64 * DRAWN_TRIANGLE_NS,
-        counters.elements as f64 * ELEMENT_NS,
-    ]
-    .map(|ns| 1e-9 * ns)
-}
-
 /// The next round aims a bit lower than it must: errors of errors.
 const AIM: f64 = 0.9;
 
 /// No part is planned finer than the last time by more than this: the cost grows with its square.
-const MOST_FINER: f64 = 6.0;
+const MOST_FINER: f64 = 10.0;
 
 /// Where what cannot be planned for leaves less than this of the square, the rest would have to be far finer than
 /// is asked for, and the whole hardly better.

@@ -5,18 +5,14 @@ use thiserror::Error;
 
 use super::ledger::LedgerError;
 use crate::output::OutputError;
-use crate::plan::PlanError;
-use crate::run::RunError;
+use crate::rounds::RoundsError;
 
 /// Why there is no study. What was measured so far is in the ledger.
 #[derive(Debug, Error)]
 pub enum TradeError {
-    /// There is no plan for a reference, however coarse.
-    #[error("no reference can be planned")]
-    ReferencePlan(#[source] PlanError),
     /// The reference cannot be computed.
     #[error("the reference cannot be computed")]
-    Reference(#[source] RunError),
+    Reference(#[source] RoundsError),
     /// The sky cannot be.
     #[error(transparent)]
     Sky(#[from] SkyError),
@@ -32,7 +28,7 @@ pub enum TradeError {
     /// The results cannot be written.
     #[error(transparent)]
     Output(#[from] OutputError),
-    /// A plan cannot be named.
-    #[error("a plan cannot be written down")]
-    Plan(#[source] serde_json::Error),
+    /// A run cannot be named.
+    #[error("a run cannot be named")]
+    Name(#[source] serde_json::Error),
 }

@@ -85,23 +85,23 @@ fn reference(comparison: &Comparison) -> String {
         .zip(&comparison.reference_error_percent);
     let own = bands.map(|(band, error)| format!("{} % in {}", short(*error), escaped(band)));
     format!(
-        "The reference is the mean of runs planned for {} %; by their scatter it errs by {} itself, which is taken off.",
+        "The reference is the mean of runs that err by {} % by their own account; by their scatter it errs by {} itself, which is taken off.",
         short(comparison.reference_percent),
         own.collect::<Vec<_>>().join(", ")
     )
 }
 
 const KINDS: [&str; 3] = [
-    "planned for an accuracy, D = inf",
-    "planned with a finite D",
+    "asked for as an accuracy, D = inf",
+    "within a finite D",
     "off its plan: no flags ask for it",
 ];
 
 fn kind(row: &Row) -> usize {
-    match (&row.flags, row.setting.diameter) {
-        (None, _) => 2,
-        (_, Diameter::Metres(_)) => 1,
-        _ => 0,
+    match row.setting.diameter {
+        _ if row.flags.is_some() => 0,
+        Diameter::Metres(_) if row.setting.is_within() => 1,
+        _ => 2,
     }
 }
 
@@ -157,19 +157,19 @@ fn band_section(comparison: &Comparison, band: usize) -> String {
 
 /// The settings that differ in nothing but the diameter, if there are any.
 fn diameters(comparison: &Comparison) -> String {
-    let planned = || {
+    let alike = || {
         comparison
             .measured()
-            .filter(|(_, row, _)| row.flags.is_some())
+            .filter(|(_, row, _)| row.setting.is_within())
     };
-    let finite = planned().find(|(_, row, _)| row.setting.diameter != Diameter::Infinite);
+    let finite = alike().find(|(_, row, _)| row.setting.diameter != Diameter::Infinite);
     let Some((_, first, _)) = finite else {
         return "<section>\n<h2>Error over D</h2>\n<p>No finite diameter D of the sphere of near exchange was \
                 measured: a canopy that stands alone has none.</p>\n</section>\n"
             .to_owned();
     };
     let accuracy = first.setting.accuracy_percent;
-    let own = planned().filter(|(_, row, _)| row.setting.accuracy_percent == accuracy);
+    let own = alike().filter(|(_, row, _)| row.setting.accuracy_percent == accuracy);
     let mut own: Vec<(Option<f64>, &Row, &Measured)> = own
         .map(|(_, row, m)| match row.setting.diameter {
             Diameter::Metres(metres) => (Some(metres), row, m),
@@ -194,7 +194,7 @@ fn diameters(comparison: &Comparison) -> String {
         lines,
     });
     format!(
-        "<section>\n<h2>Error over D</h2>\n{plot}<p>All marks are planned for {accuracy} % and differ in D alone: \
+        "<section>\n<h2>Error over D</h2>\n{plot}<p>All marks have the plan that {accuracy} % comes to, and differ in D alone: \
          within the sphere light is exchanged on the true geometry, beyond it a multilayer model stands in. Without \
          bounds (inf, at the right) there is no model; what a mark is above that one is about what the model \
          costs.</p>\n</section>\n"
@@ -275,7 +275,7 @@ mod tests {
         assert_eq!(text.matches("<svg").count(), text.matches("</svg>").count());
         for said in [
             "--accuracy 0.5 --diameter inf",
-            "may add rounds",
+            "all of its\nrounds",
             "is not in the error bar",
             "computed by itself",
             ">inf</text>",

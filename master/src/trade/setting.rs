@@ -1,4 +1,5 @@
-//! What a study tries: accuracies as they are planned, and one knob at a time turned off its plan.
+//! What a study tries: accuracies as they are solved for, and one knob at a time turned off the plan that one of
+//! them comes to.
 
 use std::fmt;
 
@@ -6,12 +7,12 @@ use nestrad_common::options::Diameter;
 use nestrad_common::problem::Problem;
 use serde::{Deserialize, Serialize};
 
-use crate::plan::{DEFAULT_ACCURACY_PERCENT, Plan, PlanError, Scale, Settings};
+use crate::plan::{Aims, DEFAULT_ACCURACY_PERCENT, Plan, PlanError, Scale, Settings};
 
-/// A plan for an accuracy and a diameter, and what of it is changed.
+/// An accuracy, and what is changed of the plan that it comes to.
 #[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
 pub struct Setting {
-    /// Accuracy that is planned for, percent.
+    /// Accuracy that is asked for, percent.
     pub accuracy_percent: f64,
     /// Diameter of the sphere of near exchange.
     pub diameter: Diameter,
@@ -61,8 +62,13 @@ impl Factors {
 }
 
 impl Setting {
-    /// As it is planned.
-    pub fn planned(accuracy_percent: f64, diameter: Diameter) -> Self {
+    /// As it is solved for.
+    pub fn asked(accuracy_percent: f64) -> Self {
+        Self::within(accuracy_percent, Diameter::Infinite)
+    }
+
+    /// The same plan within a sphere.
+    pub fn within(accuracy_percent: f64, diameter: Diameter) -> Self {
         Self {
             accuracy_percent,
             diameter,
@@ -72,8 +78,13 @@ impl Setting {
     }
 
     /// Whether a user can ask for it: no knob is turned off its plan.
-    pub fn is_planned(&self) -> bool {
-        self.bins.is_none() && self.times == Factors::default()
+    pub fn is_asked(&self) -> bool {
+        *self == Self::asked(self.accuracy_percent)
+    }
+
+    /// Whether nothing but the diameter differs from what a user asks for.
+    pub fn is_within(&self) -> bool {
+        *self == Self::within(self.accuracy_percent, self.diameter)
     }
 
     /// The flags of `nestrad solve` that ask for it, if there are any.
@@ -83,19 +94,30 @@ impl Setting {
         if memory_GiB != Settings::default().memory_GiB {
             flags += &format!(" --memory {memory_GiB}");
         }
-        self.is_planned().then_some(flags)
+        self.is_asked().then_some(flags)
     }
 
-    /// Its plan, if that takes no more than so much memory.
-    pub fn plan(&self, problem: &Problem, memory_GiB: f64, seed: u64) -> Result<Plan, PlanError> {
-        let settings = Settings {
+    /// What a user asks for.
+    pub fn settings(&self, memory_GiB: f64, seed: u64) -> Settings {
+        Settings {
             diameter: self.diameter,
             accuracy_percent: self.accuracy_percent,
-            memory_GiB: f64::INFINITY,
+            in_rounds: true,
+            memory_GiB,
             seed,
             ..Settings::default()
-        };
-        let mut plan = Plan::new(problem, &settings)?;
+        }
+    }
+
+    /// A plan for these aims with its knobs turned, if it takes no more than so much memory.
+    pub fn turned(
+        &self,
+        problem: &Problem,
+        aims: &Aims,
+        memory_GiB: f64,
+        seed: u64,
+    ) -> Result<Plan, PlanError> {
+        let mut plan = Plan::aimed(problem, &self.settings(f64::INFINITY, seed), aims)?;
         let times = &self.times;
         plan.max_edge_m *= times.max_edge;
         plan.direct_line_area_m2 *= times.direct_pitch.powi(2);
@@ -153,15 +175,15 @@ pub fn targets_percent(finest_percent: f64) -> Vec<f64> {
     targets
 }
 
-/// What to try on a problem. Settings that come to the same plan are tried once.
+/// What to try on a problem. What knobs are turned from comes before them.
 pub fn grid(problem: &Problem, finest_percent: f64) -> Vec<Setting> {
     let base = DEFAULT_ACCURACY_PERCENT.max(finest_percent);
     let mut settings: Vec<Setting> = LADDER_PERCENT
         .into_iter()
         .filter(|&a| a >= FINER_THAN_FINEST * finest_percent)
-        .map(|a| Setting::planned(a, Diameter::Infinite))
+        .map(Setting::asked)
         .collect();
-    let planned = Setting::planned(base, Diameter::Infinite);
+    let planned = Setting::asked(base);
     let turned = |turn: fn(&mut Factors, f64), by: [f64; 2]| {
         by.map(|factor| {
             let mut setting = planned;
@@ -169,14 +191,16 @@ pub fn grid(problem: &Problem, finest_percent: f64) -> Vec<Setting> {
             setting
         })
     };
-    settings.push(planned);
+    if !settings.contains(&planned) {
+        settings.push(planned);
+    }
     settings.extend(turned(|t, by| t.direct_pitch = by, [0.5, 2.0]));
     settings.extend(turned(|t, by| t.line_pitch = by, [0.5, 2.0]));
     settings.extend(turned(|t, by| t.max_edge = by, [0.5, 2.0]));
     settings.extend(turned(|t, by| t.sets = by, [0.5, 2.0]));
     settings.extend(turned(|t, by| t.tolerance = by, [0.01, 100.0]));
     let diameters = diameters_m(problem);
-    let within = |d: f64| Setting::planned(base, Diameter::Metres(d));
+    let within = |d: f64| Setting::within(base, Diameter::Metres(d));
     settings.extend(diameters.iter().map(|&d| within(d)));
     if let Some(&middle) = diameters.get(diameters.len() / 2) {
         settings.extend([1, 3, 6, 12].map(|bins| Setting {
@@ -184,7 +208,7 @@ pub fn grid(problem: &Problem, finest_percent: f64) -> Vec<Setting> {
             ..within(middle)
         }));
     }
-    distinct(problem, settings)
+    settings
 }
 
 /// Diameters from half an organ's side to twice the height of the scene, metres, each twice the last one.
@@ -201,21 +225,6 @@ fn diameters_m(problem: &Problem) -> Vec<f64> {
         .collect()
 }
 
-/// The settings without those whose plan an earlier one has. What cannot be planned is kept, to be shown.
-fn distinct(problem: &Problem, settings: Vec<Setting>) -> Vec<Setting> {
-    let mut plans = Vec::new();
-    settings
-        .into_iter()
-        .filter(|setting| {
-            let plan = setting.plan(problem, f64::INFINITY, 1);
-            let text = plan.ok().and_then(|p| serde_json::to_string(&p).ok());
-            let new = text.is_none() || !plans.contains(&text);
-            plans.push(text);
-            new
-        })
-        .collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -229,12 +238,12 @@ mod tests {
 
     #[test]
     fn a_name_says_what_is_changed() {
-        let mut setting = Setting::planned(0.5, Diameter::Metres(0.4));
-        assert_eq!(setting.to_string(), "0.5 %, D 0.4 m");
-        let flags = setting.flags(8.0);
-        assert_eq!(flags.as_deref(), Some("--accuracy 0.5 --diameter 0.4"));
-        let flags = setting.flags(20.5).expect("as planned");
+        let flags = Setting::asked(0.5).flags(8.0);
+        assert_eq!(flags.as_deref(), Some("--accuracy 0.5 --diameter inf"));
+        let flags = Setting::asked(0.5).flags(20.5).expect("as asked");
         assert!(flags.ends_with(" --memory 20.5"), "{flags}");
+        let mut setting = Setting::within(0.5, Diameter::Metres(0.4));
+        assert_eq!(setting.to_string(), "0.5 %, D 0.4 m");
         setting.bins = Some(3);
         setting.times.direct_pitch = 2.0;
         assert_eq!(setting.flags(8.0), None);

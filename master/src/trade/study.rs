@@ -1,54 +1,27 @@
 //! The study: a reference, then every setting with every seed; what the ledger has is not computed again.
 
-use std::borrow::Cow;
-use std::fmt::{self, Write as _};
-use std::path::Path;
-
-use nestrad_common::light::SkyLight;
-use nestrad_common::light::sky::SkyError;
-use nestrad_common::options::Diameter;
 use nestrad_common::problem::Problem;
 use serde::{Deserialize, Serialize};
 
 use super::error::TradeError;
+use super::keys::{digest, key};
 use super::ledger::Ledger;
 use super::measure::Reference;
 use super::pace::Pace;
-use super::setting::{Factors, Setting};
+use super::request::{Cost, How, Own, Request};
+use super::setting::Setting;
 use crate::errors::ErrorParts;
-use crate::heap::Freed;
 use crate::output::progress::Progress;
-use crate::output::resources::{Stage, Stopwatch, forget_peak_memory};
-use crate::plan::{Aims, Plan, PlanError};
-use crate::run::{Finished, RunError, solve};
+use crate::output::resources::Stage;
+use crate::plan::Aims;
+use crate::rounds::RoundsError;
+use crate::run::RunError;
 use crate::world::is_soil;
-
-/// What to study.
-#[derive(Clone, Copy, Debug)]
-pub struct Request<'a> {
-    /// The scene under its light.
-    pub problem: &'a Problem,
-    /// The sky that it is lit by, if it is: every run has its own directions of it, as many as its accuracy asks
-    /// for, so that their error is in its own.
-    pub sky: Option<&'a SkyLight>,
-    /// Folder of the ledger.
-    pub out: &'a Path,
-    /// Settings to try.
-    pub settings: &'a [Setting],
-    /// Finest error that a setting is wanted for, percent; the reference is about half of it.
-    pub finest_percent: f64,
-    /// Memory that a solve may take, GiB.
-    pub memory_GiB: f64,
-    /// Runs of each setting, at least two: their scatter is in the error bars.
-    pub runs: u32,
-    /// Seed of the first run; the others follow it.
-    pub seed: u64,
-}
 
 /// What came of it.
 #[derive(Clone, Debug)]
 pub struct Study {
-    /// Accuracy that the reference was planned for, percent.
+    /// Error of a run of the reference by its own account, percent, at most.
     pub reference_percent: f64,
     /// Bands in which plants absorb, with what others are measured against.
     pub bands: Vec<(String, Reference)>,
@@ -63,16 +36,20 @@ pub struct Study {
 #[serde(rename_all = "snake_case")]
 enum Record {
     /// A run of the reference.
-    Reference(Organs),
+    Reference(Reached),
     /// A run of a setting.
     Run(Done),
     /// A run that failed, and why.
     Failed(String),
 }
 
-/// What each organ absorbs.
+/// A run of the reference.
 #[derive(Clone, Debug, Deserialize, Serialize)]
-struct Organs {
+struct Reached {
+    /// What its last round was planned for.
+    aims: Aims,
+    /// Error of its worst band by its own account, percent.
+    stated_percent: f64,
     area_m2: Vec<f64>,
     /// Indexed organ * bands + band.
     absorbed_W: Vec<f64>,
@@ -81,6 +58,8 @@ struct Organs {
 /// A run of a setting.
 #[derive(Clone, Debug, Deserialize, PartialEq, Serialize)]
 pub struct Done {
+    /// What its last round was planned for.
+    pub aims: Aims,
     /// Per band of the study: squared error against the reference, whose own is in it, percent².
     pub square_percent2: Vec<f64>,
     /// Per band of the study: error by the run's own account, percent.
@@ -101,18 +80,8 @@ pub struct Done {
 const REFERENCE_RUNS: u64 = 3;
 /// Seeds of the reference are so far from those of the runs.
 const REFERENCE_SEEDS: u64 = 1 << 32;
-/// A reference is planned for this part of the finest target.
+/// A reference is asked for this part of the finest target.
 const FINER: f64 = 0.5;
-/// Direct light of a reference is finer than its accuracy asks for, as it costs little.
-const REFERENCE_TIMES: Factors = Factors {
-    sets: 1.0,
-    line_pitch: 1.0,
-    direct_pitch: 0.7,
-    max_edge: 1.0,
-    tolerance: 0.1,
-};
-/// A reference is not coarser than this.
-const COARSEST_PERCENT: f64 = 5.0;
 
 /// Carries out a study. `say` is told of every run before it begins.
 pub fn run(
@@ -129,35 +98,36 @@ pub fn run(
     let problem = request.problem;
     let world = digest(problem);
     let mut computed = 0;
-    let (reference_percent, plans) = reference_plans(request)?;
-    let (mut keys, mut organs) = (Vec::new(), Vec::new());
-    for (number, (problem, plan)) in plans.iter().enumerate() {
-        let key = key(&[&world, &sources(problem), "reference", &json(plan)?]);
+    let (mut references, mut against) = (Vec::<Reached>::new(), world.clone());
+    for number in 0..REFERENCE_RUNS {
+        let setting = Setting::asked(FINER * request.finest_percent);
+        let seed = request.seed.wrapping_add(REFERENCE_SEEDS + number);
+        let how = match references.first() {
+            None => How::Asked(setting, seed),
+            // the others need no rounds to come to the same plan
+            Some(first) => How::Turned(setting, seed, first.aims),
+        };
+        let key = key(&[&against, "reference", &request.name(&how)?]);
         if !matches!(ledger.get(&key), Some(Record::Reference(_))) {
             say(&format!(
                 "reference, run {} of {REFERENCE_RUNS}",
                 number + 1
             ));
-            let (finished, _) = solved(problem, plan, progress).map_err(TradeError::Reference)?;
-            let solution = finished.solution;
-            let record = Organs {
-                area_m2: solution.organ_area_m2,
-                absorbed_W: solution.organs.iter().map(|o| o.absorbed_W).collect(),
-            };
-            ledger.add(&key, Record::Reference(record))?;
+            let solved = request.solved(&how, progress)?;
+            let (own, _) = solved.map_err(TradeError::Reference)?;
+            ledger.add(&key, Record::Reference(Reached::of(&own)))?;
             computed += 1;
         }
         if let Some(Record::Reference(own)) = ledger.get(&key) {
-            organs.push(own.clone());
+            references.push(own.clone());
         }
-        keys.push(key);
+        against = key;
     }
-    let plants = plants(problem, &organs);
-    let (numbers, bands) = references(problem, &plants, &organs);
+    let plants = plants(problem, &references);
+    let (numbers, bands) = judges(problem, &plants, &references);
     if bands.is_empty() {
         return Err(TradeError::Dark);
     }
-    let against = key(&keys.iter().map(String::as_str).collect::<Vec<_>>());
     let mut measured: Vec<Result<Vec<Done>, String>> = vec![Ok(Vec::new()); request.settings.len()];
     let total = request.settings.len() * request.runs as usize;
     let (mut number, mut pace) = (0, Pace::new(request.settings.len()));
@@ -169,27 +139,19 @@ pub fn run(
                 continue;
             }
             let seed = request.seed.wrapping_add(run);
-            let problem = &*request.lit(setting.accuracy_percent, seed)?;
-            let plan = match setting.plan(problem, request.memory_GiB, seed) {
-                Ok(plan) => plan,
-                Err(error) => {
-                    measured[place] = Err(error.to_string());
-                    pace.failed(place);
-                    continue;
-                }
-            };
+            let how = how(request, setting, seed, run as usize, &measured);
             let threads = rayon::current_num_threads().to_string();
-            let key = key(&[&world, &sources(problem), &against, &json(&plan)?, &threads]);
+            let key = key(&[&against, &request.name(&how)?, &threads]);
             if ledger.get(&key).is_none() {
                 let left = pace.left(place, u64::from(request.runs) - 1 - run);
                 say(&format!(
                     "run {number} of {total}, {setting}, seed {seed}; {left}"
                 ));
-                let record = match solved(problem, &plan, progress) {
-                    Ok((finished, cost)) => {
-                        measure(problem, &plants, (&numbers, &bands), &finished, cost)
+                let record = match request.solved(&how, progress)? {
+                    Ok((own, cost)) => measure(problem, &plants, (&numbers, &bands), &own, cost),
+                    Err(RoundsError::Run(RunError::Cancelled(_))) => {
+                        return Err(TradeError::Cancelled);
                     }
-                    Err(RunError::Cancelled(_)) => return Err(TradeError::Cancelled),
                     Err(error) => Record::Failed(error.to_string()),
                 };
                 ledger.add(&key, record)?;
@@ -210,57 +172,49 @@ pub fn run(
             }
         }
     }
+    let largest = |error: f64, own: &Reached| error.max(own.stated_percent);
     Ok(Study {
-        reference_percent,
+        reference_percent: references.iter().fold(0.0, largest),
         bands,
         measured,
         computed,
     })
 }
 
-impl<'a> Request<'a> {
-    /// The scene as a solve for that accuracy would light it.
-    fn lit(&self, accuracy_percent: f64, seed: u64) -> Result<Cow<'a, Problem>, SkyError> {
-        let mut problem = Cow::Borrowed(self.problem);
-        if let Some(sky) = self.sky {
-            let directions = Aims::of(accuracy_percent).sky_directions();
-            problem.to_mut().light_by(sky, directions, seed)?;
-        }
-        Ok(problem)
+/// Knobs are turned off what the same seed came to where nothing was turned.
+fn how(
+    request: &Request<'_>,
+    setting: &Setting,
+    seed: u64,
+    run: usize,
+    measured: &[Result<Vec<Done>, String>],
+) -> How {
+    if setting.is_asked() {
+        return How::Asked(*setting, seed);
     }
+    let accuracy = setting.accuracy_percent;
+    let unturned = Setting::asked(accuracy);
+    let place = request.settings.iter().position(|s| *s == unturned);
+    let done = place.and_then(|place| measured[place].as_ref().ok()?.get(run));
+    let aims = done.map_or_else(|| Aims::of(accuracy), |done| done.aims);
+    How::Turned(*setting, seed, aims)
 }
 
-/// A scene under its light, and the plan for it.
-type Lit<'a> = (Cow<'a, Problem>, Plan);
-
-/// Plans of the reference, as fine as the memory allows.
-fn reference_plans<'a>(request: &Request<'a>) -> Result<(f64, Vec<Lit<'a>>), TradeError> {
-    let mut percent = FINER * request.finest_percent;
-    loop {
-        let setting = Setting {
-            times: REFERENCE_TIMES,
-            ..Setting::planned(percent, Diameter::Infinite)
-        };
-        let seeds = (0..REFERENCE_RUNS).map(|k| request.seed.wrapping_add(REFERENCE_SEEDS + k));
-        let plan = |seed| -> Result<_, TradeError> {
-            let lit = request.lit(percent, seed)?;
-            let plan = setting.plan(&lit, request.memory_GiB, seed);
-            Ok((lit, plan.map_err(TradeError::ReferencePlan)?))
-        };
-        let plans: Result<Vec<_>, _> = seeds.map(plan).collect();
-        match plans {
-            Err(TradeError::ReferencePlan(PlanError::Memory { .. }))
-                if percent < COARSEST_PERCENT =>
-            {
-                percent *= std::f64::consts::SQRT_2;
-            }
-            plans => return plans.map(|plans| (percent, plans)),
+impl Reached {
+    fn of(own: &Own) -> Self {
+        let solution = &own.finished.solution;
+        let errors = own.finished.errors.iter().map(ErrorParts::total_percent);
+        Self {
+            aims: own.aims,
+            stated_percent: errors.fold(0.0, f64::max),
+            area_m2: solution.organ_area_m2.clone(),
+            absorbed_W: solution.organs.iter().map(|o| o.absorbed_W).collect(),
         }
     }
 }
 
 /// Numbers of the organs that are plants and have an area.
-fn plants(problem: &Problem, runs: &[Organs]) -> Vec<usize> {
+fn plants(problem: &Problem, runs: &[Reached]) -> Vec<usize> {
     let scene = &problem.scene;
     let mut plant = vec![true; scene.organs.len()];
     for (&organ, soil) in scene.organ.iter().zip(is_soil(scene)) {
@@ -273,15 +227,15 @@ fn plants(problem: &Problem, runs: &[Organs]) -> Vec<usize> {
 }
 
 /// Numbers of the bands in which plants absorb, and what others are measured against in them.
-fn references(
+fn judges(
     problem: &Problem,
     plants: &[usize],
-    runs: &[Organs],
+    runs: &[Reached],
 ) -> (Vec<usize>, Vec<(String, Reference)>) {
     let bands = problem.bands.len();
-    let areas = |run: &Organs| plants.iter().map(|&o| run.area_m2[o]).collect::<Vec<f64>>();
+    let areas = |run: &Reached| plants.iter().map(|&o| run.area_m2[o]).collect::<Vec<f64>>();
     let of = |b: usize| {
-        let per_area = |run: &Organs| {
+        let per_area = |run: &Reached| {
             let own = plants
                 .iter()
                 .map(|&o| run.absorbed_W[o * bands + b] / run.area_m2[o]);
@@ -294,38 +248,11 @@ fn references(
     (0..bands).filter_map(of).unzip()
 }
 
-struct Cost {
-    wall_s: f64,
-    cpu_s: f64,
-    peak_memory_bytes: Option<u64>,
-    stages: Vec<Stage>,
-}
-
-/// A solve, with its own peak of memory.
-fn solved(
-    problem: &Problem,
-    plan: &Plan,
-    progress: &Progress,
-) -> Result<(Finished, Cost), RunError> {
-    Freed::default().give_back();
-    let anew = forget_peak_memory();
-    let mut watch = Stopwatch::start();
-    let finished = solve(problem, plan, progress, &mut watch)?;
-    let usage = watch.usage();
-    let cost = Cost {
-        wall_s: usage.wall_s,
-        cpu_s: usage.cpu_s,
-        peak_memory_bytes: usage.peak_memory_bytes.filter(|_| anew),
-        stages: watch.stages().to_vec(),
-    };
-    Ok((finished, cost))
-}
-
 fn measure(
     problem: &Problem,
     plants: &[usize],
     (numbers, bands): (&[usize], &[(String, Reference)]),
-    finished: &Finished,
+    Own { aims, finished }: &Own,
     cost: Cost,
 ) -> Record {
     let solution = &finished.solution;
@@ -346,6 +273,7 @@ fn measure(
         parts.map(ErrorParts::total_percent)
     };
     Record::Run(Done {
+        aims: *aims,
         square_percent2,
         stated_percent: numbers.iter().map(|&b| stated(b)).collect(),
         wall_s: cost.wall_s,
@@ -354,40 +282,4 @@ fn measure(
         row_bytes: 4 * finished.counters.exchange.row_entries,
         stages: cost.stages,
     })
-}
-
-fn json(plan: &Plan) -> Result<String, TradeError> {
-    serde_json::to_string(plan).map_err(TradeError::Plan)
-}
-
-struct Hashing(blake3::Hasher);
-
-impl fmt::Write for Hashing {
-    fn write_str(&mut self, text: &str) -> fmt::Result {
-        self.0.update(text.as_bytes());
-        Ok(())
-    }
-}
-
-/// Names the sources of a problem.
-fn sources(problem: &Problem) -> String {
-    format!("{:?}", problem.sources)
-}
-
-/// Names a problem, and the program that solves it: numbers are written so that they read back.
-fn digest(problem: &Problem) -> String {
-    let mut hasher = Hashing(blake3::Hasher::new());
-    let (version, kernel) = (env!("CARGO_PKG_VERSION"), nestrad_worker::kernel());
-    // a hasher takes all that it gets
-    let _ = write!(hasher, "{version}\n{kernel}\n{problem:?}");
-    hasher.0.finalize().to_hex().to_string()
-}
-
-fn key(parts: &[&str]) -> String {
-    let mut hasher = blake3::Hasher::new();
-    for part in parts {
-        hasher.update(&(part.len() as u64).to_le_bytes());
-        hasher.update(part.as_bytes());
-    }
-    hasher.finalize().to_hex().to_string()
 }

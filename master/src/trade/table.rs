@@ -4,8 +4,9 @@ use std::io::Write;
 
 use super::choice::{Missed, Point, choose, pareto};
 use super::measure::ErrorRange;
+use super::request::Request;
 use super::setting::{Setting, targets_percent};
-use super::study::{Done, Request, Study};
+use super::study::{Done, Study};
 use crate::output::number::round_to_nine_digits;
 use crate::output::table::{Column, Table};
 use crate::output::{Fault, csv};
@@ -13,7 +14,7 @@ use crate::output::{Fault, csv};
 /// Settings side by side.
 #[derive(Clone, Debug)]
 pub struct Comparison {
-    /// Accuracy that the reference was planned for, percent.
+    /// Error of a run of the reference by its own account, percent, at most.
     pub reference_percent: f64,
     /// Names of the bands in which plants absorb.
     pub bands: Vec<String>,
@@ -304,10 +305,10 @@ pub(super) mod tests {
 
     /// Two bands whose names are tags; a setting of each kind, and one that failed.
     pub(in crate::trade) fn example() -> Comparison {
-        let inf = |a| Setting::planned(a, Diameter::Infinite);
+        let inf = Setting::asked;
         let mut off = inf(0.5);
         off.times.sets = 0.5;
-        let failed = Setting::planned(0.5, Diameter::Metres(0.8));
+        let failed = Setting::within(0.5, Diameter::Metres(0.8));
         let mut example = Comparison {
             reference_percent: 0.1,
             bands: vec!["<b>PAR</b>".to_owned(), "N,IR".to_owned()],
@@ -316,7 +317,7 @@ pub(super) mod tests {
                 row(inf(2.0), 1.0, 1.5),
                 row(inf(0.5), 10.0, 0.4),
                 row(off, 7.0, 0.41),
-                row(Setting::planned(0.5, Diameter::Metres(0.4)), 3.0, 3.0),
+                row(Setting::within(0.5, Diameter::Metres(0.4)), 3.0, 3.0),
                 Row {
                     setting: failed,
                     flags: failed.flags(8.0),

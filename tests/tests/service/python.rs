@@ -144,7 +144,7 @@ fn ctrl_c_in_python_cancels_at_the_master() {
         "--out",
         "absorbed.csv",
     ]);
-    let mut child = python.args(["--accuracy", "0.1"]).spawn().unwrap();
+    let mut child = python.args(["--accuracy", "0.05"]).spawn().unwrap();
     let state = |wanted| {
         let list = block_on(async {
             let list = client(&master).list_solves(v1::ListSolvesRequest {}).await;

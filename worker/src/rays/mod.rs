@@ -99,8 +99,7 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
         return;
     };
     let n = block.divisions[t];
-    let [a, b, c] = triangle;
-    let longest_m = a.distance(*b).max(b.distance(*c)).max(c.distance(*a)) / f64::from(n);
+    let longest_m = geometry::longest_edge(triangle) / f64::from(n);
     for local in block.first[t]..block.first[t + 1] {
         let above = block.above_soil(t, local);
         let area_m2 = match &above {

@@ -24,7 +24,7 @@ struct Args {
     /// Rows of 40 plants of maize, of 4300 triangles or so each, beside as much bare soil
     #[arg(long, default_value_t = 7)]
     rows: u32,
-    /// Of so many jobs of a kind one is computed; the others take its time and size
+    /// Of so many jobs of a kind one is computed, past the first batch; the others take its time and size
     #[arg(long, default_value_t = 64)]
     every: usize,
     /// Of the solve, percent

@@ -10,11 +10,10 @@ use nestrad_master::exchange::{
     Assembly, BlockOf, JobCounts, JobOf, JobRows, batches, block_message, demand, split,
 };
 use nestrad_master::output::resources::cpu_seconds;
-use nestrad_master::plan::Settings;
+use nestrad_master::plan::{Aims, Plan, Settings};
 use nestrad_master::world::World;
 use nestrad_proto::packed::{self, Shape};
 use nestrad_tests::canopies::{par_and_nir, problem, uniform_sky};
-use nestrad_tests::solving::plan;
 use nestrad_worker::Demand;
 use prost::Message;
 
@@ -76,7 +75,7 @@ fn canopy(rows: u32) -> Problem {
 }
 
 impl Recorded {
-    /// Computes every so many jobs, each on one thread.
+    /// Computes the jobs of a batch, and every so many of the others, each on one thread.
     pub(crate) fn measure(field: Field, every: usize) -> Self {
         let problem = canopy(field.rows);
         let settings = Settings {
@@ -85,7 +84,14 @@ impl Recorded {
             memory_GiB: 1e6,
             ..Settings::default()
         };
-        let plan = plan(&problem, &settings);
+        // what rounds come to in maize: elements are fine enough as they are by default
+        let aims = Aims {
+            elements_percent: Aims::of(settings.accuracy_percent)
+                .elements_percent
+                .max(0.5),
+            ..Aims::of(settings.accuracy_percent)
+        };
+        let plan = Plan::aimed(&problem, &settings, &aims).unwrap();
         let (world, sampling) = (plan.world(&problem), plan.sampling.unwrap());
         let blocks = [BlockOf::whole(&world)];
         let batches = batches(&sampling);
@@ -102,14 +108,17 @@ impl Recorded {
         let begun_s = cpu_seconds();
         let tracer = one.install(|| nestrad_worker::Tracer::new(&block));
         let tree_s = cpu_seconds() - begun_s;
-        let mut results: Vec<(JobOf, JobRows)> = Vec::new();
+        let (mut results, mut measured) = (Vec::<(JobOf, JobRows)>::new(), 0);
         let mut measure = |job: &JobOf| {
             let batch = job.message(&batches[job.batch as usize]);
             let begun_s = cpu_seconds();
             let rows = one.install(|| nestrad_worker::trace_packed(&block, || &tracer, &batch));
             let took_s = cpu_seconds() - begun_s;
             let rows = JobRows::from(rows);
-            results.push((job.clone(), rows.clone()));
+            if job.batch == 0 {
+                results.push((job.clone(), rows.clone()));
+            }
+            measured += 1;
             Job {
                 batch: job.batch,
                 cost_s: job.cost_s,
@@ -119,12 +128,12 @@ impl Recorded {
                 rays: batch.rays.is_some(),
             }
         };
-        // the others take the time and size of the last one of their kind
+        // the first batch whole, as a master joins it; the others take the time and size of the last one of their kind
         let (mut jobs, mut last) = (Vec::new(), [None, None]);
         let mut seen = [0, 0];
         for job in &of {
             let kind = usize::from(job.rays.is_some());
-            let this = last[kind].filter(|_| seen[kind] % every != 0);
+            let this = last[kind].filter(|_| job.batch > 0 && seen[kind] % every != 0);
             let this: Job = this.unwrap_or_else(|| measure(job));
             seen[kind] += 1;
             last[kind] = Some(this);
@@ -134,7 +143,6 @@ impl Recorded {
                 ..this
             });
         }
-        let measured = results.len();
         let [check_s, join_s] = one.install(|| master_s(&world, &blocks, results));
         Self {
             triangles: problem.scene.triangles.len(),
@@ -160,8 +168,7 @@ fn master_s(world: &World, blocks: &[BlockOf], results: Vec<(JobOf, JobRows)>) -
         rows: world.rows() as u32,
         ends: world.ends.len() as u32,
     };
-    let (mut jobs, mut rows): (Vec<JobOf>, Vec<JobRows>) = results.into_iter().unzip();
-    jobs.iter_mut().for_each(|job| job.batch = 0);
+    let (jobs, mut rows): (Vec<JobOf>, Vec<JobRows>) = results.into_iter().unzip();
     let entries: u64 = rows.iter().map(|r| r.traced.row_entries).sum();
     let begun_s = cpu_seconds();
     for rows in &rows {

@@ -1,0 +1,71 @@
+//! How much a plan computes, reckoned beforehand.
+
+use nestrad_common::elements::Elements;
+use nestrad_common::problem::Problem;
+
+use super::Plan;
+use crate::solver::HALF_BATCHES;
+use crate::world::{SoilGrid, extent_of};
+
+/// Numbers of what takes time and memory in a solve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Counts {
+    /// Triangles of the scene.
+    pub triangles: f64,
+    /// Elements that they are cut into.
+    pub elements: f64,
+    /// Rows of the exchange.
+    pub rows: f64,
+    /// Directions of the exchange.
+    pub directions: f64,
+    /// Entries of all rows.
+    pub entries: f64,
+    /// Lines of the direct light, those of a sky included.
+    pub direct_lines: f64,
+    /// Directions of a sky.
+    pub sky_directions: f64,
+}
+
+impl Counts {
+    /// Of a plan for a problem.
+    pub fn of(problem: &Problem, plan: &Plan) -> Self {
+        let scene = &problem.scene;
+        let extent = extent_of(scene);
+        let soil = scene
+            .soil_z_m
+            .map(|z_m| SoilGrid::over(&extent, z_m, plan.soil_cell_m));
+        let elements = Elements::count(scene, plan.max_edge_m) as f64;
+        let rows = 2.0 * elements + soil.map_or(0.0, |s| f64::from(s.cells()));
+        let areas = plan.direct_line_areas_m2(problem);
+        let direct = problem.sources.iter().zip(areas);
+        let mut counts = Self {
+            triangles: scene.triangles.len() as f64,
+            elements,
+            rows,
+            directions: 0.0,
+            entries: 0.0,
+            direct_lines: direct
+                .map(|(source, area)| extent.lines_through(-source.direction, area))
+                .sum(),
+            sky_directions: problem.sky_directions as f64,
+        };
+        let Some(sampling) = &plan.sampling else {
+            return counts;
+        };
+        counts.directions =
+            f64::from(sampling.batches * sampling.sets_per_batch * sampling.axes.count());
+        // each hit is seen from both sides, each line has two ends
+        let hits = 0.5 * counts.directions * plan.scale.area_m2 / sampling.line_area_m2;
+        let lines = sampling.lines(&extent);
+        let rays =
+            f64::from(sampling.batches) * sampling.least_samples * rows / HALF_BATCHES as f64;
+        counts.entries = 2.0 * hits
+            + lines
+            + if sampling.sets_per_batch == 0 {
+                rays
+            } else {
+                0.1 * rays
+            };
+        counts
+    }
+}

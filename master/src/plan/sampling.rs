@@ -1,0 +1,142 @@
+//! How the exchange and the far field are sampled for an accuracy.
+//!
+//! The variance of what an organ gathers is taken as `(1 + w / L) / n` for `n` directions of `L` lines on an
+//! organ each: what differs from direction to direction, and from line to line within one. A direction costs
+//! `n (d T + e N L)`, for `T` triangles that are drawn and `N` organs on which lines meet, so the least cost of a
+//! variance has `L = sqrt(w d T / (e N))`: dense lines where organs are meshes of many triangles, thin ones where
+//! an organ is a triangle or two.
+
+use nestrad_common::directions::Axes;
+use nestrad_common::problem::Problem;
+
+use super::{Aims, DEFAULT_ACCURACY_PERCENT, Estimator, Scale, Settings};
+use crate::exchange::Sampling;
+use crate::far_field::closure::Resolution;
+use crate::solver::HALF_BATCHES;
+
+/// Lines on an organ whose variance is that between directions: 2 for flat leaves, 16 to 25 for maize and bean
+/// (measured: `master/docs/accuracy.md`). Its root counts.
+const WITHIN: f64 = 16.0;
+
+/// To draw a triangle along a direction, ns; to find, pack and use what a line sees on an organ, from both sides.
+const DRAWN_NS: f64 = 24.0;
+const MET_NS: f64 = 190.0;
+/// Triangles that take as long to draw as it takes to begin with a direction.
+const OF_A_DIRECTION: f64 = 10_000.0;
+
+/// Lines on an organ in a direction, at least and at most.
+const FEWEST_ON_ORGAN: f64 = 2.0;
+const MOST_ON_ORGAN: f64 = 75.0;
+
+/// Lines that meet an element of average size, all directions of a half together: with fewer, rays would have to
+/// make up for many.
+const ON_ELEMENT: f64 = 10.0;
+
+/// Lines of a direction, at most: some, and what the leaves of a canopy of a tenth of a square metre of
+/// leaf per square metre ask for. Where leaves are fewer still, most lines would meet none of them.
+const LINES_ANYWHERE: f64 = 1e5;
+const LINES_PER_ORGAN: f64 = 1500.0;
+const LINES_PER_TRIANGLE: f64 = 3.0;
+
+/// Rays from each face in each half, at the default accuracy.
+const RAYS: f64 = 64.0;
+
+/// Sampling of the exchange of a scene that is cut into so many elements. 16 batches of 2 sets of 16 axes give 0.3
+/// to 0.45 % in NIR.
+pub(super) fn lines(
+    problem: &Problem,
+    scale: &Scale,
+    elements: u64,
+    settings: &Settings,
+    aims: &Aims,
+) -> Sampling {
+    let finer = aims.exchange_percent / DEFAULT_ACCURACY_PERCENT;
+    let (sets_per_batch, least_samples) = match settings.estimator {
+        // a twentieth too few is not worth another set
+        Estimator::Lines => ((1.9 / (finer * finer)).ceil() as u32, 4.0),
+        Estimator::Rays => (0, (RAYS / (finer * finer)).round().clamp(8.0, 1e6)),
+    };
+    let (axes, scene) = (Axes::Both, &problem.scene);
+    let most_lines = LINES_ANYWHERE
+        + LINES_PER_ORGAN * scene.organs.len() as f64
+        + LINES_PER_TRIANGLE * scene.triangles.len() as f64;
+    let directions = HALF_BATCHES as f64 * f64::from(sets_per_batch.max(1) * axes.count());
+    // lines see |cos| of an area, whose mean over the hemisphere is 1/2
+    let of_organs = 0.5 * scale.organ_area_m2 / lines_on_organ(problem, scale);
+    let of_elements = 0.5 * scale.area_m2 / elements.max(1) as f64 * directions / ON_ELEMENT;
+    Sampling {
+        batches: 2 * HALF_BATCHES as u32,
+        axes,
+        sets_per_batch,
+        line_area_m2: of_organs
+            .min(of_elements)
+            .min(4.5 * scale.triangle_area_m2)
+            .min(scale.ground_area_m2 / 1000.0)
+            .max(scale.ground_area_m2 / most_lines)
+            .max(f64::MIN_POSITIVE),
+        least_samples,
+        seed: settings.seed,
+    }
+}
+
+/// The number of lines on an organ of average size that gives a variance for the least time.
+fn lines_on_organ(problem: &Problem, scale: &Scale) -> f64 {
+    let organs = (scale.area_m2 / scale.organ_area_m2).max(1.0);
+    let triangles = problem.scene.triangles.len() as f64;
+    (WITHIN * DRAWN_NS * (triangles + OF_A_DIRECTION) / (MET_NS * organs))
+        .sqrt()
+        .clamp(FEWEST_ON_ORGAN, MOST_ON_ORGAN)
+}
+
+pub(super) fn far_field(settings: &Settings, finer: f64) -> Resolution {
+    let more = 1.0 / (finer * finer);
+    Resolution {
+        levels: 65,
+        bins: 6,
+        sets_per_batch: (2.0 * more).round().clamp(1.0, 32.0) as u32,
+        lines: (24_000.0 * more).clamp(1e4, 1e6) as u32,
+        seed: settings.seed,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nestrad_common::scene::{Organ, Scene};
+
+    use super::*;
+
+    /// So many organs of so many triangles each, 1 cm² a triangle.
+    fn lines(organs: u32, triangles: u32) -> f64 {
+        let all = organs * triangles;
+        let organ = Organ {
+            id: "leaf".to_owned(),
+            plant: "plant".to_owned(),
+        };
+        let problem = Problem {
+            scene: Scene {
+                triangles: vec![Default::default(); all as usize],
+                organs: vec![organ; organs as usize],
+                ..Scene::default()
+            },
+            ..Problem::default()
+        };
+        let scale = Scale {
+            area_m2: 1e-4 * f64::from(all),
+            ground_area_m2: 1.0,
+            height_m: 1.0,
+            organ_area_m2: 1e-4 * f64::from(triangles),
+            triangle_area_m2: 1e-4,
+            triangle_edge_m: 0.014,
+        };
+        lines_on_organ(&problem, &scale)
+    }
+
+    #[test]
+    fn lines_are_thin_where_organs_are_a_triangle_or_two() {
+        let (meshes, flat) = (lines(100, 600), lines(100_000, 2));
+        assert!((30.0..60.0).contains(&meshes), "{meshes}");
+        assert!((2.0..5.0).contains(&flat), "{flat}");
+        // what a direction costs at least is not saved
+        assert_eq!(lines(3, 2), MOST_ON_ORGAN);
+    }
+}
