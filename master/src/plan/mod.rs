@@ -237,7 +237,7 @@ impl Plan {
                 .max(f64::MIN_POSITIVE),
         );
         // points on the outline of an organ: see `spread_effort`
-        let direct_line_area_m2 = (scale.organ_area_m2 / 8_000.0 * of_direct.powf(4.0 / 3.0))
+        let direct_line_area_m2 = (scale.organ_area_m2 / 10_000.0 * of_direct.powf(4.0 / 3.0))
             .min(scale.triangle_area_m2 / 4.0)
             .min(max_edge_m * max_edge_m / EDGE_SQUARED_IN_POINTS)
             .clamp(
@@ -324,7 +324,7 @@ const LEAST_SOIL_CELLS: f64 = 64.0;
 /// of leaf per square metre asks for. What is too small for them is probed with rays.
 fn most_points(problem: &Problem, finer: f64) -> f64 {
     let scene = &problem.scene;
-    let of_organs = 8_000.0 * scene.organs.len() as f64 / finer.powf(4.0 / 3.0);
+    let of_organs = 10_000.0 * scene.organs.len() as f64 / finer.powf(4.0 / 3.0);
     (1e6 + 10.0 * (of_organs + 4.0 * scene.triangles.len() as f64)).min(MOST_DIRECT_LINES)
 }
 
