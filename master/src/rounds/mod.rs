@@ -163,39 +163,8 @@ pub fn solve_in_rounds(
     mut begins: impl FnMut(&Plan, &[Round]),
 ) -> Result<Reached, RoundsError> {
     let begun = Instant::now();
-    let mut problem = Cow::Borrowed(problem);
     let asked = settings.accuracy_percent;
-    let lit = |problem: &Problem, aims: &Aims| {
-        let mut problem = problem.clone();
-        if let Some(sky) = sky {
-            // the same sky, as it was checked before
-            let directions = aims.sky_directions();
-            problem.light_by(sky, directions, settings.seed).ok()?;
-        }
-        Some(problem)
-    };
-    let pilot = Aims::pilot(asked);
-    let coarse = settings.in_rounds.then(|| lit(&problem, &pilot)).flatten();
-    let coarse = coarse.and_then(|coarse| {
-        let plan = Plan::aimed(&coarse, settings, &pilot).ok()?;
-        Some((coarse, plan))
-    });
-    let all_s = |problem, plan| work_s(&Counts::of(problem, plan)).iter().sum::<f64>();
-    let mut plan = match (Plan::new(&problem, settings), coarse) {
-        (Ok(plan), Some((coarse, pilot)))
-            if settings.budget_s.is_some()
-                || all_s(&coarse, &pilot) < WORTH_A_LOOK * all_s(&problem, &plan) =>
-        {
-            problem = Cow::Owned(coarse);
-            pilot
-        }
-        // it may not need as much as it was planned with
-        (Err(PlanError::Memory { .. } | PlanError::Elements { .. }), Some((coarse, pilot))) => {
-            problem = Cow::Owned(coarse);
-            pilot
-        }
-        (plan, _) => plan?,
-    };
+    let (mut problem, mut plan) = first(problem, sky, settings)?;
     let mut rounds = Vec::new();
     let mut last: Option<Reached> = None;
     loop {
@@ -237,7 +206,7 @@ pub fn solve_in_rounds(
         };
         let next = next.and_then(|aims| {
             let problem = if aims.sky_percent < plan.aims.sky_percent {
-                Cow::Owned(lit(&problem, &aims).ok_or(Ended::NoFiner)?)
+                lit(&problem, sky, &aims, settings.seed).ok_or(Ended::NoFiner)?
             } else {
                 problem.clone()
             };
@@ -264,6 +233,52 @@ pub fn solve_in_rounds(
             Err(_) => return Ok(reached),
         }
     }
+}
+
+/// The first round: what is asked for, or a coarse look where that saves.
+fn first<'a>(
+    problem: &'a Problem,
+    sky: Option<&SkyLight>,
+    settings: &Settings,
+) -> Result<(Cow<'a, Problem>, Plan), PlanError> {
+    let problem = Cow::Borrowed(problem);
+    let plan = Plan::new(&problem, settings);
+    if !settings.in_rounds {
+        return Ok((problem, plan?));
+    }
+    let aims = Aims::pilot(settings.accuracy_percent);
+    let look = lit(&problem, sky, &aims, settings.seed).and_then(|problem| {
+        let plan = Plan::aimed(&problem, settings, &aims).ok()?;
+        Some((problem, plan))
+    });
+    let all_s = |problem, plan| work_s(&Counts::of(problem, plan)).iter().sum::<f64>();
+    match (plan, look) {
+        (Ok(plan), Some((coarse, look)))
+            if settings.budget_s.is_some()
+                || all_s(&coarse, &look) < WORTH_A_LOOK * all_s(&problem, &plan) =>
+        {
+            Ok((coarse, look))
+        }
+        // it may not need as much as it was planned with
+        (Err(PlanError::Memory { .. } | PlanError::Elements { .. }), Some(look)) => Ok(look),
+        (plan, _) => Ok((problem, plan?)),
+    }
+}
+
+/// The problem with as many directions of its sky as the aims ask for; as it is where it has none.
+fn lit<'a>(
+    problem: &Cow<'a, Problem>,
+    sky: Option<&SkyLight>,
+    aims: &Aims,
+    seed: u64,
+) -> Option<Cow<'a, Problem>> {
+    let mut problem = problem.clone();
+    if let Some(sky) = sky {
+        // the same sky, as it was checked before
+        let directions = aims.sky_directions();
+        problem.to_mut().light_by(sky, directions, seed).ok()?;
+    }
+    Some(problem)
 }
 
 /// What to plan the next round for; where time is limited, with what the last one took and what is left.

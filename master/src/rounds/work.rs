@@ -11,16 +11,17 @@ pub(super) type PerPart = [f64; PARTS];
 /// Rough times of one core, ns: only their ratios matter. They are counts times constants, not clocks, so that
 /// the next round is the same on any machine.
 const ROW_ENTRY_NS: f64 = 80.0;
-const DIRECTION_NS: f64 = 24.0;
+/// Of a triangle along a direction of the exchange, and of a sky.
+const DRAWN_TRIANGLE_NS: f64 = 24.0;
+const SKY_TRIANGLE_NS: f64 = 40.0;
 const DIRECT_LINE_NS: f64 = 15.0;
-const SKY_DIRECTION_NS: f64 = 40.0;
 const ELEMENT_NS: f64 = 5000.0;
 
 /// Time that what is reckoned takes, s.
 pub(super) fn work_s(counts: &Counts) -> PerPart {
     let of_a_triangle = [
-        counts.directions * DIRECTION_NS,
-        counts.sky_directions * SKY_DIRECTION_NS,
+        counts.directions * DRAWN_TRIANGLE_NS,
+        counts.sky_directions * SKY_TRIANGLE_NS,
     ];
     let [exchange, sky] = of_a_triangle.map(|ns| ns * counts.triangles);
     [
