@@ -6,7 +6,7 @@ use nestrad_common::problem::Problem;
 use thiserror::Error;
 
 use crate::cluster::Cluster;
-use crate::direct::{Direct, direct_light};
+use crate::direct::{Direct, DirectError, direct_light};
 use crate::errors::{ErrorParts, OrganParts};
 use crate::exchange::{
     BlockOf, Exchange, ExchangeError, JobCounts, Outlook, Sampling, Traced, trace_here, trace_kept,
@@ -51,6 +51,9 @@ pub struct Counters {
 /// Why a solve failed.
 #[derive(Debug, Error)]
 pub enum RunError {
+    /// Direct light could not be computed.
+    #[error(transparent)]
+    Direct(#[from] DirectError),
     /// The exchange could not be computed.
     #[error(transparent)]
     Exchange(#[from] ExchangeError),
@@ -108,7 +111,8 @@ pub struct Means<'a> {
     pub kept: Option<&'a Store>,
 }
 
-/// Solves a problem as planned in this process, or stops at the end of a step if `progress` is told so.
+/// Solves a problem as planned in this process, or stops at the end of a step (a source, a batch, a pass) if
+/// `progress` is told so.
 pub fn solve(
     problem: &Problem,
     plan: &Plan,
@@ -174,7 +178,9 @@ pub fn solve_with(
             incoming_W: &direct.incoming_W,
             far_sample: meanwhile.far_sample.as_ref(),
         };
-        irradiance = system.solve(&plan.scattering_bands, &plan.tolerance)?;
+        irradiance = system.solve(&plan.scattering_bands, &plan.tolerance, &|| {
+            progress.check()
+        })?;
         watch.lap("solve");
         progress.check()?;
     }
@@ -244,20 +250,23 @@ impl Meanwhile {
         (progress, shown): (&Progress, bool),
         watch: &mut Stopwatch,
     ) -> Result<Self, RunError> {
-        let stage = |name: &str| {
+        let stage = |name: &str, steps: usize| {
             if shown {
-                progress.stage(name, 0);
+                progress.stage(name, steps as u64);
             }
         };
-        stage("direct light");
+        stage("direct light", problem.sources.len());
         let areas_m2 = plan.direct_line_areas_m2(problem);
-        let direct =
-            direct_light(problem, world, &areas_m2, plan.seed).map_err(ExchangeError::from)?;
+        let direct = direct_light(problem, world, &areas_m2, plan.seed, || {
+            if shown {
+                progress.inc(1);
+            }
+            progress.check()
+        })?;
         watch.lap("direct light");
-        progress.check()?;
         let (mut far, mut far_sample, mut fixed_W_m2) = (None, None, Vec::new());
         if let Some(sampling) = &plan.sampling {
-            stage("far field");
+            stage("far field", 0);
             let rows = plan.far_field.map(|f| FarRows::trace(problem, world, &f));
             far = rows.transpose().map_err(ExchangeError::from)?;
             fixed_W_m2 = fixed(problem, world, plan);

@@ -2,9 +2,12 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::{DVec2, DVec3};
 use nestrad_common::problem::Problem;
-use nestrad_master::direct::direct_light;
+use nestrad_master::direct::{DirectError, direct_light};
+use nestrad_master::output::progress::Cancelled;
 use nestrad_master::plan::Settings;
 use nestrad_tests::enclosure::full_plate;
 use nestrad_tests::scenery::{Scenery, from_zenith};
@@ -18,7 +21,7 @@ fn absorbed(problem: &Problem, pitch_m: f64) -> Vec<(f64, f64)> {
     let areas = vec![pitch_m * pitch_m; problem.sources.len()];
     let runs: Vec<Vec<f64>> = (1..=16)
         .map(|seed| {
-            let direct = direct_light(problem, &world, &areas, seed).unwrap();
+            let direct = direct_light(problem, &world, &areas, seed, || Ok(())).unwrap();
             let mut organs = vec![0.0; problem.scene.organs.len()];
             for (e, &t) in world.triangle_of_element.iter().enumerate() {
                 // black on both faces
@@ -98,4 +101,26 @@ fn the_shadow_of_a_leaf_wraps_around_the_pattern() {
             assert_close(&what, mean, expected, se, 4.0, 0.03);
         }
     }
+}
+
+/// It went on to the last source of a sky, minutes on a large field.
+#[test]
+fn what_is_cancelled_stops_at_the_next_source() {
+    let mut scenery = Scenery::open();
+    scenery.level("plate", DVec3::ZERO, DVec2::new(1.0, 0.6));
+    scenery.band("B", 0.0, &[]);
+    for k in 0..200 {
+        scenery.source(from_zenith(f64::from(k) * 0.4, 25.0), 1.0);
+    }
+    let problem = &scenery.problem;
+    let world = plan(problem, &Settings::default()).world(problem);
+    let (asked, enough) = (AtomicUsize::new(0), 10);
+    let step = || match asked.fetch_add(1, Ordering::Relaxed) {
+        before if before < enough => Ok(()),
+        _ => Err(Cancelled),
+    };
+    let stopped = direct_light(problem, &world, &vec![1e-4; 200], 1, step);
+    assert!(matches!(stopped, Err(DirectError::Cancelled(_))));
+    // one source more of each group that was at work
+    assert!(asked.into_inner() < enough + 16);
 }

@@ -4,10 +4,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::cell::Cell;
+
 use glam::{DVec2, DVec3};
 use nestrad_common::ends::Side;
 use nestrad_common::optics::{FaceOptics, LeafOptics};
-use nestrad_master::solver::{System, Tolerance};
+use nestrad_master::output::progress::Cancelled;
+use nestrad_master::solver::{Irradiance, SolveError, Step, System, Tolerance};
 use nestrad_tests::enclosure::{closed_box, sphere};
 use nestrad_tests::form_factor::Traced;
 use nestrad_tests::scenery::Scenery;
@@ -19,6 +22,18 @@ use nestrad_tests::statistics::assert_within;
 /// All light that reaches a face counts, so unit irradiance everywhere is what unit emission of
 /// everything brings: E = 1 + rho E.
 fn heated(scenery: &Scenery, traced: &Traced, lit: &[usize]) -> Vec<f64> {
+    let irradiance = solved(scenery, traced, lit, &|| Ok(())).unwrap();
+    (0..traced.world.rows())
+        .map(|row| irradiance.mean(row, 0))
+        .collect()
+}
+
+fn solved(
+    scenery: &Scenery,
+    traced: &Traced,
+    lit: &[usize],
+    step: Step,
+) -> Result<Irradiance, SolveError> {
     let (world, exchange) = (&traced.world, &traced.exchange);
     let mut direct = vec![0.0; world.rows()];
     for &row in lit {
@@ -41,10 +56,23 @@ fn heated(scenery: &Scenery, traced: &Traced, lit: &[usize]) -> Vec<f64> {
         incoming_W: &[1.0],
         far_sample: None,
     };
-    let irradiance = system.solve(&[0], &tolerance).unwrap();
-    (0..world.rows())
-        .map(|row| irradiance.mean(row, 0))
-        .collect()
+    system.solve(&[0], &tolerance, step)
+}
+
+#[test]
+fn what_is_cancelled_stops_at_the_next_pass() {
+    let mut scenery = sphere(2);
+    scenery.band("B", 0.0, &[("wall", LeafOptics::opaque(0.9))]);
+    let traced = Traced::new(&scenery.problem, 0.2, &sampling(ESTIMATORS[0], 0.02, 40.0));
+    let asked = Cell::new(0);
+    let step = || match asked.replace(asked.get() + 1) {
+        0..3 => Ok(()),
+        _ => Err(Cancelled),
+    };
+    let rows: Vec<usize> = (0..traced.world.rows()).collect();
+    let stopped = solved(&scenery, &traced, &rows, &step);
+    assert!(matches!(stopped, Err(SolveError::Cancelled(_))));
+    assert_eq!(asked.get(), 4);
 }
 
 #[test]

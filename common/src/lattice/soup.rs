@@ -18,9 +18,16 @@ const BLOCK: usize = 128;
 impl Soup {
     /// Takes the triangles as they are.
     pub fn new(triangles: Vec<[DVec3; 3]>) -> Self {
-        let column =
-            |vertex: usize, axis: usize| triangles.iter().map(|t| t[vertex][axis]).collect();
-        let columns = [0, 1, 2].map(|v| [0, 1, 2].map(|axis| column(v, axis)));
+        let mut columns: [[Vec<f64>; 3]; 3] =
+            std::array::from_fn(|_| std::array::from_fn(|_| Vec::with_capacity(triangles.len())));
+        // in one reading: the triangles of a large scene do not stay in the cache
+        for triangle in &triangles {
+            for (columns, vertex) in columns.iter_mut().zip(triangle) {
+                for (column, x) in columns.iter_mut().zip(vertex.to_array()) {
+                    column.push(x);
+                }
+            }
+        }
         Self { triangles, columns }
     }
 

@@ -8,6 +8,7 @@ pub mod door;
 pub mod local;
 mod receive;
 pub mod scheduler;
+mod sending;
 mod service;
 mod solving;
 
@@ -23,6 +24,7 @@ use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::{Notify, Semaphore};
 
 use scheduler::{Id, Rules, Scheduler, SolveCounts, Time, WorkerCounts};
+use sending::Turns;
 use solving::Open;
 
 /// What a master allows its workers.
@@ -77,6 +79,8 @@ struct Shared {
     joined: Condvar,
     /// Kibibytes of results that may come in now.
     room: Semaphore,
+    /// Who is sent a block now.
+    turns: Turns,
     /// Where rows are checked and joined.
     compute: ThreadPool,
     totals: Totals,
@@ -163,6 +167,7 @@ impl Cluster {
             }),
             changed: Notify::new(),
             joined: Condvar::new(),
+            turns: Turns::new(),
             room: Semaphore::new(kibibytes(u64::from(limits.result_bytes)) as usize),
             compute,
             totals: Totals::default(),

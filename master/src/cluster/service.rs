@@ -4,21 +4,20 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
+use nestrad_proto::MAX_MESSAGE_BYTES;
 use nestrad_proto::packed::Shape;
 use nestrad_proto::v1::worker_service_server::{WorkerService, WorkerServiceServer};
 use nestrad_proto::v1::{
-    Drain, FetchBlockRequest, FetchBlockResponse, GiveBackRequest, GiveBackResponse, JoinRequest,
-    JoinResponse, LeaseRequest, LeaseResponse, LeasedJob, LeaveRequest, LeaveResponse, Nothing,
-    RenewRequest, RenewResponse, ReturnRowsRequest, ReturnRowsResponse, fetch_block_response,
-    lease_response, return_rows_request,
+    Drain, FetchBlockRequest, GiveBackRequest, GiveBackResponse, JoinRequest, JoinResponse,
+    LeaseRequest, LeaseResponse, LeasedJob, LeaveRequest, LeaveResponse, Nothing, RenewRequest,
+    RenewResponse, ReturnRowsRequest, ReturnRowsResponse, lease_response, return_rows_request,
 };
-use nestrad_proto::{MAX_MESSAGE_BYTES, SLICE_BYTES};
 use tokio::sync::oneshot;
-use tokio_stream::Iter;
 use tonic::{Request, Response, Status, Streaming};
 
 use super::receive::{self, Expected};
 use super::scheduler::{BlockId, Id, Leased, Refusal, WorkerFacts};
+use super::sending::Sending;
 use super::{Cluster, State, kibibytes};
 use crate::exchange::JobRows;
 
@@ -115,7 +114,7 @@ impl WorkerService for Service {
         }))
     }
 
-    type FetchBlockStream = Iter<std::vec::IntoIter<Result<FetchBlockResponse, Status>>>;
+    type FetchBlockStream = Sending;
 
     async fn fetch_block(
         &self,
@@ -138,15 +137,7 @@ impl WorkerService for Service {
             .totals
             .bytes_out
             .fetch_add(size, Ordering::Relaxed);
-        let chunks = (0..bytes.len())
-            .step_by(SLICE_BYTES)
-            .map(|at| bytes.slice(at..(at + SLICE_BYTES).min(bytes.len())));
-        let parts = std::iter::once(fetch_block_response::Part::TotalBytes(size))
-            .chain(chunks.map(fetch_block_response::Part::Chunk));
-        let messages: Vec<Result<FetchBlockResponse, Status>> = parts
-            .map(|part| Ok(FetchBlockResponse { part: Some(part) }))
-            .collect();
-        Ok(Response::new(tokio_stream::iter(messages)))
+        Ok(Response::new(cluster.0.turns.send(bytes).await))
     }
 
     async fn renew(

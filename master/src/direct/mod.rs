@@ -20,7 +20,9 @@ use nestrad_common::problem::Problem;
 use nestrad_worker::BlockFault;
 use rand::RngExt;
 use rayon::prelude::*;
+use thiserror::Error;
 
+use crate::output::progress::Cancelled;
 use crate::world::World;
 use areas::Areas;
 use probe::Probe;
@@ -62,21 +64,35 @@ impl Direct {
 /// result does not depend on the number of threads.
 const GROUPS: usize = 8;
 
-/// Projects every source. `line_area_m2` holds, per source, the cross-section of a line (m²).
+/// Why there is no direct light.
+#[derive(Debug, Error)]
+pub enum DirectError {
+    /// The kernel refused the scene.
+    #[error("rays for what is too small for the lattice refused")]
+    Block(#[from] BlockFault),
+    /// It is not wanted any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
+}
+
+/// Projects every source. `line_area_m2` holds, per source, the cross-section of a line (m²); `step` is asked
+/// before each of them.
 pub fn direct_light(
     problem: &Problem,
     world: &World,
     line_area_m2: &[f64],
     seed: u64,
-) -> Result<Direct, BlockFault> {
+    step: impl Fn() -> Result<(), Cancelled> + Sync,
+) -> Result<Direct, DirectError> {
     let areas = Areas::of(problem);
     let probe = Probe::new(problem, world, &areas, line_area_m2, seed)?;
-    let parts: Vec<Direct> = groups(problem)
+    let parts: Result<Vec<Direct>, Cancelled> = groups(problem)
         .into_par_iter()
         .map(|group| {
             let mut part = empty(problem, world);
             let mut scratch = source::Scratch::new(world, problem.scene.organs.len());
             for k in group {
+                step()?;
                 let mut rng = stream(seed, Purpose::Direct, k as u64);
                 let random = [rng.random(), rng.random(), 0.5];
                 let drawn = source::Drawn {
@@ -94,9 +110,10 @@ pub fn direct_light(
                     &mut part,
                 );
             }
-            part
+            Ok(part)
         })
         .collect();
+    let parts = parts?;
     let mut sum = empty(problem, world);
     for part in &parts {
         let add =

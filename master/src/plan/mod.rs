@@ -3,6 +3,8 @@
 
 mod aims;
 mod counts;
+mod density;
+mod elements;
 mod limits;
 mod memory;
 mod reasons;
@@ -192,14 +194,28 @@ impl fmt::Display for Short {
 impl Plan {
     /// Decides what a problem needs for the accuracy of the settings.
     pub fn new(problem: &Problem, settings: &Settings) -> Result<Self, PlanError> {
-        Self::aimed(problem, settings, &Aims::of(settings.accuracy_percent))
+        let scale = Scale::of(problem);
+        let mut aims = Aims::of(settings.accuracy_percent);
+        if settings.in_rounds {
+            aims = elements::fine_enough(aims, settings.accuracy_percent, &scale);
+            aims = sampling::with_a_margin(aims, problem, &scale);
+        }
+        Self::of_scale(problem, settings, &aims, scale)
     }
 
     /// The same with an error to aim at for each part, in place of the accuracy.
     pub fn aimed(problem: &Problem, settings: &Settings, aims: &Aims) -> Result<Self, PlanError> {
+        Self::of_scale(problem, settings, aims, Scale::of(problem))
+    }
+
+    fn of_scale(
+        problem: &Problem,
+        settings: &Settings,
+        aims: &Aims,
+        scale: Scale,
+    ) -> Result<Self, PlanError> {
         limits::check_accuracy(aims.exchange_percent.min(aims.direct_percent))?;
         limits::check_overhang(problem)?;
-        let scale = Scale::of(problem);
         limits::check_height(&scale)?;
         limits::check_pattern(problem, &scale)?;
         let has_soil = problem.scene.soil_z_m.is_some();
@@ -207,13 +223,8 @@ impl Plan {
         let scattering_bands: Vec<usize> = (0..problem.bands.len())
             .filter(|&b| lit(b) && !problem.bands[b].is_black(has_soil))
             .collect();
-        let organ_m = match scale.organ_area_m2 {
-            0.0 => f64::INFINITY,
-            area => area.sqrt(),
-        };
-        let edge_m = (EDGE * organ_m)
-            .min((scale.ground_area_m2 / 1000.0).sqrt())
-            .max(f64::MIN_POSITIVE);
+        let organ_m = scale.organ_m();
+        let edge_m = elements::edge_m(&scale);
         let coarser = aims.coarser_elements();
         let elements = Elements::count(&problem.scene, edge_m * coarser);
         let sampling = (!scattering_bands.is_empty())
@@ -295,6 +306,11 @@ impl Plan {
         )
     }
 
+    /// Planning the exchange for a larger error than this makes it no coarser.
+    pub fn coarsest_exchange_percent(&self, problem: &Problem) -> f64 {
+        sampling::coarsest_percent(problem, &self.scale)
+    }
+
     /// Cross-sections of the lines of each source, m².
     pub fn direct_line_areas_m2(&self, problem: &Problem) -> Vec<f64> {
         direct::spread_effort(
@@ -305,13 +321,6 @@ impl Plan {
         )
     }
 }
-
-/// Longest edge of an element, in sides of an organ of average size. Errors go in proportion to it (measured: see
-/// `master/docs/accuracy.md`).
-const EDGE: f64 = 0.7 / 6.0;
-
-/// Planning for less than this makes the exchange no coarser: a batch has a set of axes at least.
-pub(crate) const COARSEST_EXCHANGE_PERCENT: f64 = 0.7;
 
 /// An organ of average size is not cut finer than into this many along a side, however small the sphere.
 const FINEST_CUT: f64 = 24.0;

@@ -5,6 +5,7 @@ use nestrad_common::problem::Problem;
 use rayon::prelude::*;
 use serde::Serialize;
 
+use super::density;
 use crate::world::{bounds_of, extent_of, is_soil};
 
 /// Lengths and areas that stand for a scene.
@@ -23,6 +24,8 @@ pub struct Scale {
     pub triangle_area_m2: f64,
     /// Longest edge of that triangle, on average, m.
     pub triangle_edge_m: f64,
+    /// One-sided area of other organs around a point of the canopy, on average, per volume, 1/m.
+    pub leaf_area_density_per_m: f64,
 }
 
 impl Scale {
@@ -31,9 +34,10 @@ impl Scale {
         let scene = &problem.scene;
         let soil = is_soil(scene);
         let only_soil = soil.iter().all(|&s| s);
+        let counts = |t: usize| only_soil || !soil[t];
         // summed by size, so that the order of the input leaves no trace in the rounding
         let mut areas: Vec<(f64, f64, u32)> = (0..scene.triangles.len())
-            .filter(|&t| only_soil || !soil[t])
+            .filter(|&t| counts(t))
             .map(|t| {
                 let triangle = &scene.triangles[t];
                 let edge_m = geometry::longest_edge(triangle);
@@ -54,6 +58,7 @@ impl Scale {
         let [x, y, z] = (extent.max_m - extent.min_m).to_array();
         let (lowest, highest) = bounds_of(scene);
         let mean = |squares: f64| if area > 0.0 { squares / area } else { 0.0 };
+        let organ_area_m2: f64 = mean(organs.iter().map(|a| a * a).sum());
         Self {
             area_m2: area,
             ground_area_m2: match scene.pattern {
@@ -62,9 +67,17 @@ impl Scale {
                 None => (x * y).max(0.5 * (x * y + x * z + y * z)),
             },
             height_m: highest.z - lowest.z,
-            organ_area_m2: mean(organs.iter().map(|a| a * a).sum()),
+            organ_area_m2,
             triangle_area_m2: mean(triangle_squares),
             triangle_edge_m: mean(edges),
+            leaf_area_density_per_m: density::around(scene, counts, organ_area_m2.sqrt()),
+        }
+    }
+    /// Side of an organ of average size, m; infinite where there is none.
+    pub(super) fn organ_m(&self) -> f64 {
+        match self.organ_area_m2 {
+            0.0 => f64::INFINITY,
+            area => area.sqrt(),
         }
     }
 }

@@ -145,7 +145,7 @@ pub enum RoundsError {
 }
 
 /// A coarse look comes first where it takes less than this part of what is planned without one.
-const WORTH_A_LOOK: f64 = 0.5;
+const WORTH_A_LOOK: f64 = 0.2;
 
 /// Never more rounds than this.
 const MOST_ROUNDS: usize = 5;
@@ -174,10 +174,10 @@ pub fn solve_in_rounds(
         let round_begun = Instant::now();
         let finished = match (solve_with(&problem, &plan, means, progress, watch), last) {
             (Ok(finished), _) => finished,
-            (Err(error @ RunError::Cancelled(_)), _) | (Err(error), None) => {
-                return Err(error.into());
-            }
+            (Err(error), None) => return Err(error.into()),
             (Err(_), Some(mut before)) => {
+                // whoever wants no more does not want the round before either
+                progress.check().map_err(RunError::from)?;
                 before.accuracy.ended = Ended::Failed;
                 return Ok(before);
             }
@@ -190,6 +190,7 @@ pub fn solve_in_rounds(
         });
         let measured = Measured {
             aims: plan.aims,
+            coarsest_exchange_percent: plan.coarsest_exchange_percent(&problem),
             errors: &finished.errors,
             sky_is_fixed: sky.is_none() || plan.aims.has_most_sky_directions(),
             cost_s: work_s(&Counts::of(&problem, &plan)),

@@ -14,8 +14,9 @@ const ROW_ENTRY_NS: f64 = 80.0;
 /// Of a triangle along a direction of the exchange, and of a sky.
 const DRAWN_TRIANGLE_NS: f64 = 24.0;
 const SKY_TRIANGLE_NS: f64 = 40.0;
-const DIRECT_LINE_NS: f64 = 15.0;
-const ELEMENT_NS: f64 = 5000.0;
+const DIRECT_LINE_NS: f64 = 75.0;
+/// 8 000 where lines are dense enough for smaller elements anyway, 20 000 and more where they have to be denser.
+const ELEMENT_NS: f64 = 12_000.0;
 
 /// Time that what is reckoned takes, s.
 pub(super) fn work_s(counts: &Counts) -> PerPart {

@@ -28,6 +28,7 @@ use thiserror::Error;
 
 use crate::exchange::{Exchange, Outlook};
 use crate::far_field::closure::FarRows;
+use crate::output::progress::Cancelled;
 use crate::world::World;
 pub use deviation::{Deviation, FarSample};
 use gather::Gather;
@@ -68,7 +69,13 @@ pub enum SolveError {
         /// Tolerance.
         wanted: f64,
     },
+    /// It is not wanted any more.
+    #[error(transparent)]
+    Cancelled(#[from] Cancelled),
 }
+
+/// Asked before each pass whether to go on.
+pub type Step<'a> = &'a dyn Fn() -> Result<(), Cancelled>;
 
 /// Irradiances of all rows, in both halves.
 #[derive(Clone, Debug, Default)]
@@ -126,7 +133,12 @@ pub struct System<'a> {
 impl System<'_> {
     /// Solves for the irradiance of all rows, of the part of them that is not buried, in the bands with
     /// these numbers.
-    pub fn solve(&self, bands: &[usize], tolerance: &Tolerance) -> Result<Irradiance, SolveError> {
+    pub fn solve(
+        &self,
+        bands: &[usize],
+        tolerance: &Tolerance,
+        step: Step,
+    ) -> Result<Irradiance, SolveError> {
         let rows = vec![0.0; self.world.rows() * bands.len()];
         let mut all = Irradiance {
             halves: [rows.clone(), rows],
@@ -146,6 +158,7 @@ impl System<'_> {
                 bands: &bands[done..(done + WIDEST).min(bands.len())],
                 tolerance,
                 groups: &groups,
+                step,
             };
             match group.bands.len() {
                 1 => group.solve::<1>(done, &mut all)?,
@@ -167,6 +180,7 @@ struct Group<'a> {
     bands: &'a [usize],
     tolerance: &'a Tolerance,
     groups: &'a Groups,
+    step: Step<'a>,
 }
 
 impl Group<'_> {
@@ -174,7 +188,7 @@ impl Group<'_> {
         let problem = self.system.problem;
         let gather = Gather::<N>::new(&self.system, self.bands);
         let mut pass = Pass::new(&self.system, &gather, self.bands);
-        let left = self.converge(&mut pass);
+        let left = self.converge(&mut pass)?;
         for (k, &l) in left[..self.bands.len()].iter().enumerate() {
             if l > self.tolerance.absorbed || l.is_nan() {
                 return Err(SolveError::NotConverged {
@@ -208,6 +222,7 @@ impl Group<'_> {
                 half.radiosity.iter().map(of).collect()
             });
             for half in 0..2 {
+                (self.step)()?;
                 spread.add(half, &radiosity, &mut way, variances);
             }
         }
@@ -216,7 +231,7 @@ impl Group<'_> {
 
     /// Passes until what is left to change in the absorbed power is below the tolerance, or there have been
     /// too many; returns what is left, relative to what comes in, and leaves the solution in `pass`.
-    fn converge<const N: usize>(&self, pass: &mut Pass<N>) -> [f64; N] {
+    fn converge<const N: usize>(&self, pass: &mut Pass<N>) -> Result<[f64; N], Cancelled> {
         let System { world, outlook, .. } = self.system;
         let gather = pass.gather;
         let weight: Vec<f64> = (0..world.rows())
@@ -234,15 +249,17 @@ impl Group<'_> {
         // what is left to go for each unit of change in a plain pass
         let mut behind = [f64::INFINITY; N];
         loop {
+            (self.step)()?;
             pass.with_light(&y);
             let residual = difference(&pass.y.irradiance, &y);
             let left = times(size(&residual), behind);
             if reached(&left, self.tolerance.absorbed) || pass.done >= self.tolerance.most_passes {
-                return left;
+                return Ok(left);
             }
             let mut descent = Descent::new(&weight, residual);
             // a pass more checks what the steps have come to
             while pass.done + 1 < self.tolerance.most_passes {
+                (self.step)()?;
                 descent.step(&mut y, |p| pass.scattering(p), size);
                 let (left, change) = (descent.left(), size(descent.residual()));
                 behind = std::array::from_fn(|k| match change[k] {

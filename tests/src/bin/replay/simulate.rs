@@ -10,7 +10,8 @@ use nestrad_master::cluster::scheduler::{
 
 use super::record::Recorded;
 
-/// Workers, and what lies between them and the master: one link at the master, which all share.
+/// Workers, and what lies between them and the master: one link at the master, which all share. It carries blocks
+/// out, one after the other as the master sends them, and at the same time rows in.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Setting {
     pub(crate) workers: u32,
@@ -134,7 +135,8 @@ pub(crate) fn simulate(recorded: &Recorded, setting: Setting) -> Run {
             .collect(),
         scheduler,
         clock: Clock::default(),
-        link: Line::default(),
+        blocks_out: Line::default(),
+        rows_in: Line::default(),
         master: Line::default(),
         joining: BTreeMap::new(),
         left: recorded.jobs.len(),
@@ -163,7 +165,8 @@ struct Replay<'a> {
     workers: Vec<Worker>,
     threads: Vec<Thread>,
     clock: Clock,
-    link: Line,
+    blocks_out: Line,
+    rows_in: Line,
     /// The master's threads, all at one thing.
     master: Line,
     /// By batch: jobs that are not in, and entries of those that are.
@@ -224,7 +227,7 @@ impl Replay<'_> {
         let takes_s = self.recorded.block_bytes as f64 / self.setting.bytes_per_s;
         let block_s = *of
             .block_s
-            .get_or_insert_with(|| self.link.do_for(at_s, takes_s) + self.recorded.ready_s);
+            .get_or_insert_with(|| self.blocks_out.do_for(at_s, takes_s) + self.recorded.ready_s);
         let ready_s = at_s.max(block_s);
         if !rays {
             return ready_s;
@@ -244,7 +247,7 @@ impl Replay<'_> {
         if let Some(leased) = thread.returning {
             let bytes = self.recorded.jobs[leased.job].bytes as f64;
             let takes_s = bytes / self.setting.bytes_per_s;
-            let through_s = self.link.do_for(now_s + self.setting.latency_s, takes_s);
+            let through_s = self.rows_in.do_for(now_s + self.setting.latency_s, takes_s);
             self.clock.at(through_s, What::Came(t));
         }
         self.clock.at(now_s, What::Ask(t));
