@@ -156,7 +156,9 @@ fn a_coarse_look_comes_first_where_it_saves() {
     let reached = reach(&problem, &asked(0.3));
     let accuracy = &reached.accuracy;
     assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
-    assert_eq!(accuracy.rounds[0].planned, Aims::pilot(0.3), "{accuracy:?}");
+    let (look, pilot) = (accuracy.rounds[0].planned, Aims::pilot(0.3));
+    assert_eq!(look.exchange_percent, pilot.exchange_percent);
+    assert_eq!(look.direct_percent, pilot.direct_percent);
     let elements = |aims: &Aims| aims.elements_percent;
     let (own, without) = (elements(&reached.plan.aims), elements(&Aims::of(0.3)));
     assert!(own > without, "{own} {without}");
