@@ -162,13 +162,15 @@ fn a_coarse_look_comes_first_where_it_saves() {
     let elements = |aims: &Aims| aims.elements_percent;
     let (own, without) = (elements(&reached.plan.aims), elements(&Aims::of(0.3)));
     assert!(own > without, "{own} {without}");
-    // it needs less memory than it would be planned with
+    // where what is planned does not fit, what the look comes to has to do
     let little = Settings {
         memory_GiB: 0.8 * plan(&problem, &asked(0.3)).memory.total_GiB(),
         ..asked(0.3)
     };
     assert!(Plan::new(&problem, &little).is_err());
-    assert_eq!(reach(&problem, &little).accuracy.ended, Ended::Reached);
+    let accuracy = reach(&problem, &little).accuracy;
+    assert_eq!(accuracy.ended, Ended::BeyondLimits, "{accuracy:?}");
+    assert_eq!(accuracy.rounds.len(), 1, "{accuracy:?}");
 }
 
 /// They were cut seven times finer than they are now, and had as few directions as maize: two rounds, of which the

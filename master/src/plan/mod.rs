@@ -27,6 +27,7 @@ use crate::world::{World, extent_of};
 pub use aims::Aims;
 pub use counts::Counts;
 pub use memory::Memory;
+pub(crate) use sampling::DRAWN_NS;
 pub use scale::Scale;
 
 /// What the user asks for.

@@ -19,7 +19,7 @@ use crate::solver::HALF_BATCHES;
 const WITHIN: f64 = 16.0;
 
 /// To draw a triangle along a direction, ns; to find, pack and use what a line sees on an organ, from both sides.
-const DRAWN_NS: f64 = 24.0;
+pub(crate) const DRAWN_NS: f64 = 24.0;
 const MET_NS: f64 = 190.0;
 /// Triangles that take as long to draw as it takes to begin with a direction.
 const OF_A_DIRECTION: f64 = 10_000.0;
