@@ -9,6 +9,7 @@
 use nestrad_common::directions::Axes;
 use nestrad_common::problem::Problem;
 
+use super::limits::LEAST_ACCURACY_PERCENT;
 use super::{Aims, DEFAULT_ACCURACY_PERCENT, Estimator, Scale, Settings};
 use crate::exchange::Sampling;
 use crate::far_field::closure::Resolution;
@@ -102,7 +103,7 @@ fn thin(on_organ: f64) -> f64 {
     (ENOUGH_ON_ORGAN / on_organ).max(1.0)
 }
 
-/// Planning for less than this makes the exchange no coarser: a batch has a set of axes at least.
+/// Planning for a larger error than this makes the exchange no coarser: a batch has a set of axes at least.
 pub(super) fn coarsest_percent(problem: &Problem, scale: &Scale) -> f64 {
     DEFAULT_ACCURACY_PERCENT * (SETS * thin(lines_on_organ(problem, scale))).sqrt()
 }
@@ -116,7 +117,9 @@ const NEARLY_ALWAYS: f64 = 1.25;
 pub(super) fn with_a_margin(aims: Aims, problem: &Problem, scale: &Scale) -> Aims {
     let more = (NEARLY_ALWAYS / thin(lines_on_organ(problem, scale))).max(1.0);
     Aims {
-        exchange_percent: aims.exchange_percent / more.sqrt(),
+        // the finest that may be asked for is not to be refused
+        exchange_percent: (aims.exchange_percent / more.sqrt())
+            .max(LEAST_ACCURACY_PERCENT.min(aims.exchange_percent)),
         ..aims
     }
 }
@@ -177,6 +180,16 @@ mod tests {
         assert!((2.0..5.0).contains(&flat), "{flat}");
         // what a direction costs at least is not saved
         assert_eq!(on_organ(3, 2), MOST_ON_ORGAN);
+    }
+
+    #[test]
+    fn a_margin_refuses_nothing_that_may_be_asked_for() {
+        let (meshes, scale) = canopy(100, 600);
+        let aims = |asked| with_a_margin(Aims::of(asked), &meshes, &scale).exchange_percent;
+        assert_eq!(aims(LEAST_ACCURACY_PERCENT), LEAST_ACCURACY_PERCENT);
+        assert!(aims(0.5) < 0.46);
+        // what is refused anyway
+        assert_eq!(aims(0.005), 0.005);
     }
 
     #[test]
