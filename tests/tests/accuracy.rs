@@ -173,7 +173,7 @@ fn a_coarse_look_comes_first_where_it_saves() {
     assert_eq!(accuracy.rounds.len(), 1, "{accuracy:?}");
 }
 
-/// They were cut seven times finer than they are now, and had as few directions as maize: two rounds, of which the
+/// They were cut four times finer than they are now, and had as few directions as maize: two rounds, of which the
 /// first was two fifths of the work.
 #[test]
 fn small_leaves_need_no_second_round() {

@@ -1,7 +1,7 @@
 //! How far the work of a solve can be spread: jobs of a large canopy are computed here, one thread each,
 //! then their times and sizes are replayed through the real scheduler with simulated workers.
 //!
-//!     cargo run --release -p nestrad-tests --bin replay -- [--rows N] [--every N] [--accuracy PERCENT]
+//!     cargo run --release -p nestrad-tests --bin replay -- [--rows N] [--dense] [--every N] [--accuracy PERCENT]
 
 #![allow(clippy::unwrap_used, reason = "a measurement that fails may stop")]
 #![allow(
@@ -27,6 +27,9 @@ struct Args {
     /// Of so many jobs of a kind one is computed, past the first batch; the others take its time and size
     #[arg(long, default_value_t = 64)]
     every: usize,
+    /// Without the bare soil
+    #[arg(long)]
+    dense: bool,
     /// Of the solve, percent
     #[arg(long, default_value_t = 0.1)]
     accuracy: f64,
@@ -59,6 +62,7 @@ fn main() -> Result<()> {
     let mut out = std::io::stdout().lock();
     let field = Field {
         rows: args.rows,
+        dense: args.dense,
         accuracy_percent: args.accuracy,
     };
     let recorded = Recorded::measure(field, args.every);

@@ -52,11 +52,13 @@ pub(crate) struct Recorded {
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Field {
     pub(crate) rows: u32,
+    /// Without bare soil.
+    pub(crate) dense: bool,
     pub(crate) accuracy_percent: f64,
 }
 
-/// Rows of maize on one half of the ground.
-fn canopy(rows: u32) -> Problem {
+/// Rows of maize, on one half of the ground or all of it.
+fn canopy(rows: u32, dense: bool) -> Problem {
     let mut field = Maize {
         stand: Stand {
             rows,
@@ -69,15 +71,17 @@ fn canopy(rows: u32) -> Problem {
     }
     .generate()
     .unwrap();
-    // the pattern is twice as wide as what grows on it
-    field.pattern.size_m *= DVec2::new(2.0, 1.0);
+    if !dense {
+        // the pattern is twice as wide as what grows on it
+        field.pattern.size_m *= DVec2::new(2.0, 1.0);
+    }
     problem(&field, &par_and_nir(), uniform_sky(4, 2))
 }
 
 impl Recorded {
     /// Computes the jobs of a batch, and every so many of the others, each on one thread.
     pub(crate) fn measure(field: Field, every: usize) -> Self {
-        let problem = canopy(field.rows);
+        let problem = canopy(field.rows, field.dense);
         let settings = Settings {
             accuracy_percent: field.accuracy_percent,
             // jobs are recorded, not solved with
