@@ -4,6 +4,7 @@
 //! places have to be to be lit differently. What counts is the density where the leaves are: the mean over the
 //! ground would call a row of crops on bare soil thin.
 
+use glam::DVec3;
 use nestrad_common::geometry;
 use nestrad_common::scene::Scene;
 use rayon::prelude::*;
@@ -33,7 +34,7 @@ pub(super) fn around(scene: &Scene, marked: impl Fn(usize) -> bool + Sync, organ
         .filter(|&t| marked(t))
         .map(|t| {
             let triangle = &scene.triangles[t];
-            let mut at_m = triangle.iter().copied().sum::<glam::DVec3>() / 3.0;
+            let mut at_m = triangle.iter().copied().sum::<DVec3>() / 3.0;
             if let Some(pattern) = scene.pattern {
                 let within = (at_m.truncate() - pattern.min_m).rem_euclid(pattern.size_m);
                 at_m = within.extend(at_m.z);
@@ -71,7 +72,7 @@ pub(super) fn around(scene: &Scene, marked: impl Fn(usize) -> bool + Sync, organ
 
 #[cfg(test)]
 mod tests {
-    use glam::{DVec2, DVec3};
+    use glam::DVec2;
     use nestrad_common::scene::{Organ, Pattern};
     use proptest::prelude::*;
 
@@ -103,8 +104,7 @@ mod tests {
         around(&leaves(at_m, 0.4), |_| true, 0.01)
     }
 
-    /// So many layers of leaves, 2 cm apart in each direction: 0.01² / 0.02³ m² per m³ with its own, which is left
-    /// out; eight in a cell are 100 leaves of 1 cm² per litre.
+    /// So many layers of cells of 2 cm, with so many leaves of 1 cm² along each of their sides.
     fn layers(count: usize, per_side: usize) -> Vec<DVec3> {
         let step = 0.02 / per_side as f64;
         let mut at_m = Vec::new();

@@ -31,8 +31,8 @@ pub(super) fn edge_m(scale: &Scale) -> f64 {
         .max(f64::MIN_POSITIVE)
 }
 
-/// What elements err by in NIR, in percent, where light falls off over the length of their edges: 2.3 for bean, 3 for
-/// maize and small leaves (measured there too).
+/// What elements err by in NIR, in percent, where light falls off over the length of their edges: 2.3 for maize and
+/// bean, 2.5 to 3.6 for small leaves (measured there too).
 const OF_A_LENGTH_PERCENT: f64 = 2.5;
 
 /// Part of the error that is asked for which elements may have.

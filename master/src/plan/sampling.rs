@@ -60,10 +60,12 @@ pub(super) fn lines(
     aims: &Aims,
 ) -> Sampling {
     let finer = aims.exchange_percent / DEFAULT_ACCURACY_PERCENT;
-    let on_organ = lines_on_organ(problem, scale);
     let (sets_per_batch, least_samples) = match settings.estimator {
         // a twentieth too few is not worth another set
-        Estimator::Lines => ((SETS * thin(on_organ) / (finer * finer)).ceil() as u32, 4.0),
+        Estimator::Lines => (
+            (SETS * thin(problem, scale) / (finer * finer)).ceil() as u32,
+            4.0,
+        ),
         Estimator::Rays => (0, (RAYS / (finer * finer)).round().clamp(8.0, 1e6)),
     };
     let (axes, scene) = (Axes::Both, &problem.scene);
@@ -72,7 +74,7 @@ pub(super) fn lines(
         + LINES_PER_TRIANGLE * scene.triangles.len() as f64;
     let directions = HALF_BATCHES as f64 * f64::from(sets_per_batch.max(1) * axes.count());
     // lines see |cos| of an area, whose mean over the hemisphere is 1/2
-    let of_organs = 0.5 * scale.organ_area_m2 / on_organ;
+    let of_organs = 0.5 * scale.organ_area_m2 / lines_on_organ(problem, scale);
     let of_elements = 0.5 * scale.area_m2 / elements.max(1) as f64 * directions / ON_ELEMENT;
     Sampling {
         batches: 2 * HALF_BATCHES as u32,
@@ -99,13 +101,13 @@ fn lines_on_organ(problem: &Problem, scale: &Scale) -> f64 {
 }
 
 /// How many times as many directions there are, because few lines meet an organ.
-fn thin(on_organ: f64) -> f64 {
-    (ENOUGH_ON_ORGAN / on_organ).max(1.0)
+fn thin(problem: &Problem, scale: &Scale) -> f64 {
+    (ENOUGH_ON_ORGAN / lines_on_organ(problem, scale)).max(1.0)
 }
 
 /// Planning for a larger error than this makes the exchange no coarser: a batch has a set of axes at least.
 pub(super) fn coarsest_percent(problem: &Problem, scale: &Scale) -> f64 {
-    DEFAULT_ACCURACY_PERCENT * (SETS * thin(lines_on_organ(problem, scale))).sqrt()
+    DEFAULT_ACCURACY_PERCENT * (SETS * thin(problem, scale)).sqrt()
 }
 
 /// Directions, in parts of those that are enough on average, that are enough nearly always: where a round that
@@ -115,7 +117,7 @@ const NEARLY_ALWAYS: f64 = 1.25;
 /// The aims with the exchange so fine that the first round is nearly always enough. Small organs have as much to
 /// spare already.
 pub(super) fn with_a_margin(aims: Aims, problem: &Problem, scale: &Scale) -> Aims {
-    let more = (NEARLY_ALWAYS / thin(lines_on_organ(problem, scale))).max(1.0);
+    let more = (NEARLY_ALWAYS / thin(problem, scale)).max(1.0);
     Aims {
         // the finest that may be asked for is not to be refused
         exchange_percent: (aims.exchange_percent / more.sqrt())
