@@ -8,6 +8,7 @@ pub mod authority;
 mod bits;
 pub mod channel;
 pub mod guard;
+pub mod mesh;
 pub mod packed;
 pub mod token;
 

@@ -2,6 +2,7 @@
 
 use std::sync::OnceLock;
 
+use glam::DVec3;
 use nestrad_proto::v1;
 
 use crate::{Block, PackedRows, Tracer, trace_packed};
@@ -32,12 +33,11 @@ fn sample() -> Option<PackedRows> {
     };
     let vector = |x, y, z| Some(v1::Vector { x, y, z });
     const TRIANGLES: usize = 60;
-    let mut vertices_m = Vec::new();
+    let mut triangles = Vec::with_capacity(TRIANGLES);
     for _ in 0..TRIANGLES {
         let middle = [random(), random(), 0.1 + 0.8 * random()];
-        for _ in 0..3 {
-            vertices_m.extend(middle.map(|m| m + 0.3 * (random() - 0.5)));
-        }
+        let mut corner = || middle.map(|m| m + 0.3 * (random() - 0.5));
+        triangles.push([corner(), corner(), corner()].map(DVec3::from_array));
     }
     let run = |solid| v1::TriangleRun {
         triangles: 1,
@@ -64,8 +64,7 @@ fn sample() -> Option<PackedRows> {
             far_levels: 5,
             far_bins: 3,
         }),
-        vertices_m,
-        corners: vec![0; 3 * TRIANGLES],
+        mesh: None,
         runs: (0..TRIANGLES).map(|t| run(t % 3 == 0)).collect(),
         owned_soil_cells: (0..4).collect(),
     };
@@ -92,7 +91,7 @@ fn sample() -> Option<PackedRows> {
             ..v1::Rays::default()
         }),
     };
-    let block = Block::new(&block).ok()?;
+    let block = Block::of_triangles(&block, triangles).ok()?;
     let tracer = Tracer::new(&block);
     Some(trace_packed(&block, || &tracer, &batch))
 }

@@ -60,7 +60,7 @@ pub fn trace_packed<'a>(
     let (packed, entries) = rows::pack(block, &traced);
     PackedRows {
         packed,
-        rows: block.rows as u32,
+        rows: block.rows() as u32,
         entries,
         lines: traced.lines,
         segments: traced.segments(),

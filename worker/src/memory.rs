@@ -3,6 +3,8 @@
 //! Figures per item are the sizes of the kernel's arrays; the whole is measured by a test with a real
 //! process.
 
+use nestrad_proto::v1;
+
 /// What a process takes before it holds anything: program, threads, network buffers.
 pub const BASE_BYTES: u64 = 48 << 20;
 
@@ -22,10 +24,32 @@ pub struct Demand {
 }
 
 impl Demand {
+    /// What a block says of its sizes, before any memory is taken for them; of its jobs, nothing.
+    pub fn of_message(block: &v1::Block) -> Self {
+        let mesh = block.mesh.as_ref();
+        let triangles = mesh.map_or(0, |mesh| mesh.triangles.max(mesh.vertices.div_ceil(3)));
+        let elements = |run: &v1::TriangleRun| {
+            let pieces = u64::from(run.divisions).pow(2);
+            u64::from(run.triangles).saturating_mul(pieces)
+        };
+        let world = block.world.unwrap_or_default();
+        let soil = world.soil.unwrap_or_default();
+        let cells = u64::from(soil.cells_x) * u64::from(soil.cells_y);
+        let far = u64::from(world.far_levels) * u64::from(world.far_bins);
+        // more cannot be numbered
+        let capped = |count: u64| count.min(u64::from(u32::MAX));
+        Self {
+            triangles: u64::from(triangles),
+            elements: capped(block.runs.iter().map(elements).fold(0, u64::saturating_add)),
+            other_ends: capped(cells) + 2 * capped(far),
+            ..Self::default()
+        }
+    }
+
     /// Bytes that stay taken while a worker holds the block.
     pub fn block_bytes(&self) -> u64 {
-        // vertices twice, the tree and its copies; areas, numbers and flags of elements
-        210 * self.triangles + 25 * self.elements + 8 * self.other_ends
+        // vertices twice, the tree and its copies; numbers and flags of elements
+        210 * self.triangles + 18 * self.elements + 8 * self.other_ends
     }
 
     /// Bytes that are taken besides while the block is made ready: the message, then the tree's making.

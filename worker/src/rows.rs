@@ -38,7 +38,7 @@ const SORTED_TOGETHER: usize = 1 << 13;
 /// Sorts pairs into rows: first into runs of rows, then by counting within each run, so that neither reaches
 /// over more memory than a cache holds; then each row.
 pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
-    let mut runs: Vec<Vec<Pair>> = vec![Vec::new(); block.rows.div_ceil(SORTED_TOGETHER)];
+    let mut runs: Vec<Vec<Pair>> = vec![Vec::new(); block.rows().div_ceil(SORTED_TOGETHER)];
     let mut put = |from: u32, seen: u32| {
         if let Some(row) = block.row_of(from) {
             runs[row as usize / SORTED_TOGETHER].push((row, block.number_of(seen)));
@@ -56,7 +56,7 @@ pub(crate) fn collect(block: &Block, traced: &Traced) -> v1::Rows {
         .enumerate()
         .map(|(run, entries)| {
             let first = run * SORTED_TOGETHER;
-            sorted_by_row(&entries, first..(first + SORTED_TOGETHER).min(block.rows))
+            sorted_by_row(&entries, first..(first + SORTED_TOGETHER).min(block.rows()))
         })
         .unzip();
     v1::Rows {
@@ -99,7 +99,7 @@ fn sorted_by_row(entries: &[Pair], rows: Range<usize>) -> (Vec<u32>, Vec<u32>) {
 
 /// Packs pairs as rows; gives the number of entries, too.
 pub(crate) fn pack(block: &Block, traced: &Traced) -> (Vec<u8>, u64) {
-    let (mut mutual, mut single) = (Runs::new(block.rows), Runs::new(block.rows));
+    let (mut mutual, mut single) = (Runs::new(block.rows()), Runs::new(block.rows()));
     for &(a, b) in traced.pairs.iter().flatten() {
         match (block.row_of(a), block.row_of(b)) {
             (Some(a), Some(b)) => mutual.push((a.max(b), a.min(b))),
@@ -149,7 +149,7 @@ pub(crate) fn of_far_field(block: &Block, looks: &[Pair]) -> v1::Rows {
     let first = block.local(block.ends.far_start());
     let entries: Vec<Pair> = looks
         .iter()
-        .map(|&(from, seen)| (from - first, block.seen_as[seen as usize]))
+        .map(|&(from, seen)| (from - first, block.number_of(seen)))
         .collect();
     let (lengths, ends) = sorted_by_row(&entries, 0..block.ends.far_len() as usize + 2);
     v1::Rows {

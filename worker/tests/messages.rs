@@ -2,13 +2,14 @@
 
 #![allow(clippy::unwrap_used)]
 
-use nestrad_proto::v1;
-use nestrad_worker::Block;
+use nestrad_proto::{mesh, v1};
+use nestrad_worker::{Block, Demand};
 use proptest::prelude::*;
 use prost::Message;
 
 fn block() -> v1::Block {
     let vector = |x, y, z| Some(v1::Vector { x, y, z });
+    let at = |k: u32| f64::from(k * 7 % 18) / 18.0;
     v1::Block {
         world: Some(v1::World {
             min_m: vector(0.0, 0.0, 0.0),
@@ -27,8 +28,13 @@ fn block() -> v1::Block {
             far_levels: 5,
             far_bins: 3,
         }),
-        vertices_m: (0..18).map(|k| f64::from(k * 7 % 18) / 18.0).collect(),
-        corners: vec![0; 6],
+        mesh: Some(mesh::pack(
+            [0, 1]
+                .map(|t| {
+                    [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| at(9 * t + 3 * corner + axis)))
+                })
+                .into_iter(),
+        )),
         runs: vec![
             v1::TriangleRun {
                 triangles: 1,
@@ -52,6 +58,11 @@ fn the_block_is_taken_as_it_is() {
     assert!(Block::new(&block()).is_ok());
 }
 
+/// Whether it takes no more memory than a worker might have that looks first, as workers do.
+fn fits(message: &v1::Block) -> bool {
+    Demand::of_message(message).block_bytes() < 1 << 30
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { cases: 4096, failure_persistence: None, ..ProptestConfig::default() })]
 
@@ -64,14 +75,19 @@ proptest! {
             let at = at.index(bytes.len());
             bytes[at] = byte;
         }
-        if let Ok(message) = v1::Block::decode(&bytes[..]) && let Ok(taken) = Block::new(&message) {
+        if let Ok(message) = v1::Block::decode(&bytes[..])
+            && fits(&message)
+            && let Ok(taken) = Block::new(&message)
+        {
             prop_assert!(taken.ends() >= 4);
         }
     }
 
     #[test]
     fn any_bytes_are_refused_or_taken(bytes in prop::collection::vec(any::<u8>(), 0..300)) {
-        if let Ok(message) = v1::Block::decode(&bytes[..]) {
+        if let Ok(message) = v1::Block::decode(&bytes[..])
+            && fits(&message)
+        {
             let _ = Block::new(&message);
         }
     }

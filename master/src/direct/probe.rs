@@ -10,7 +10,7 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 use super::areas::Areas;
-use crate::exchange::{BlockOf, block_message};
+use crate::exchange::{BlockOf, unbounded_block_here};
 use crate::world::World;
 
 /// An organ of less area than this many points is probed.
@@ -90,12 +90,7 @@ impl Probe {
         if organs == 0 || organs as f64 * RAYS > MOST_RAYS {
             return Ok(None);
         }
-        let mut message = block_message(&problem.scene, world, &BlockOf::whole(world));
-        if let Some(world) = &mut message.world {
-            // the sun is farther away than any sphere
-            (world.sphere_radius_m, world.far_levels) = (f64::INFINITY, 0);
-        }
-        let block = Block::new(&message)?;
+        let block = unbounded_block_here(&problem.scene, world, &BlockOf::whole(world))?;
         Ok(Some(Self {
             tracer: Tracer::new(&block),
             block,

@@ -4,12 +4,12 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use nestrad_common::scene::Scene;
 use nestrad_proto::packed::Shape;
-use nestrad_worker::{Block, Tracer, trace_packed};
+use nestrad_worker::{Tracer, trace_packed};
 use prost::Message;
 use rayon::prelude::*;
 
 use super::assembly::{Assembly, JobRows};
-use super::geometry::block_message;
+use super::geometry::{block_here, block_message};
 use super::jobs::BlockOf;
 use super::split::{JobOf, batches, split};
 use super::{Exchange, ExchangeError, JobCounts, Sampling};
@@ -26,8 +26,9 @@ pub fn trace_kept(
     progress: &Progress,
 ) -> Result<Exchange, ExchangeError> {
     let blocks = [BlockOf::whole(world)];
-    let message = block_message(scene, world, &blocks[0]);
-    let id = *blake3::hash(&message.encode_to_vec()).as_bytes();
+    let message = block_message(scene, world, &blocks[0]).encode_to_vec();
+    let id = *blake3::hash(&message).as_bytes();
+    drop(message);
     let batches = batches(sampling);
     let jobs: Arc<[JobOf]> = split(world, &blocks, &batches, sampling).into();
     progress.stage("exchange", jobs.len() as u64);
@@ -53,8 +54,7 @@ pub fn trace_kept(
         kept: (jobs.len() - missing.len()) as u64,
     };
     if !missing.is_empty() {
-        let block = Block::new(&message)?;
-        drop(message);
+        let block = block_here(scene, world, &blocks[0])?;
         let tracer = OnceLock::new();
         let assembly = Mutex::new(&mut assembly);
         missing.into_par_iter().try_for_each(|(number, key)| {

@@ -24,7 +24,8 @@ use thiserror::Error;
 use crate::output::progress::Cancelled;
 use crate::world::World;
 pub use assembly::{Assembly, JobRows};
-pub use geometry::block_message;
+pub(crate) use geometry::unbounded_block_here;
+pub use geometry::{block_here, block_message};
 pub use jobs::{BlockOf, batch_message, batch_of_lines, world_message};
 pub use kept::trace_kept;
 pub use outlook::Outlook;
@@ -226,7 +227,7 @@ pub fn trace_here(
     let mut of_batch: Vec<Vec<(&BlockOf, v1::Rows)>> =
         (0..sampling.batches).map(|_| Vec::new()).collect();
     for block in blocks {
-        let geometry = nestrad_worker::Block::new(&block_message(scene, world, block))?;
+        let geometry = block_here(scene, world, block)?;
         let tracer = nestrad_worker::Tracer::new(&geometry);
         for index in 0..sampling.batches {
             let batch = batch_message(sampling, index);

@@ -9,12 +9,12 @@ use std::num::NonZeroUsize;
 
 use nestrad_common::directions::{Axes, Purpose};
 use nestrad_common::problem::Problem;
-use nestrad_worker::{Block, BlockFault};
+use nestrad_worker::BlockFault;
 use serde::Serialize;
 
 use super::layers::Layers;
 use super::transport;
-use crate::exchange::{BatchRows, BlockOf, HalfRows, batch_of_lines, block_message};
+use crate::exchange::{BatchRows, BlockOf, HalfRows, batch_of_lines, block_here};
 use crate::solver::HALF_BATCHES;
 use crate::world::World;
 
@@ -47,11 +47,7 @@ impl FarRows {
         world: &World,
         resolution: &Resolution,
     ) -> Result<Self, BlockFault> {
-        let block = Block::new(&block_message(
-            &problem.scene,
-            world,
-            &BlockOf::whole(world),
-        ))?;
+        let block = block_here(&problem.scene, world, &BlockOf::whole(world))?;
         let size = world.extent.max_m - world.extent.min_m;
         let directions = HALF_BATCHES as u32 * resolution.sets_per_batch * Axes::Both.count();
         // lines are counted on the ground; a direction has |cos| of them, 1/2 on average

@@ -1,5 +1,11 @@
 use super::*;
 
+const LAST: DVec3 = DVec3::new(1.0, 1.0, 0.5);
+const TRIANGLES: [[DVec3; 3]; 2] = [
+    [DVec3::ZERO, DVec3::X, DVec3::Y],
+    [DVec3::Y, DVec3::X, LAST],
+];
+
 fn message() -> v1::Block {
     let vector = |x, y, z| Some(v1::Vector { x, y, z });
     v1::Block {
@@ -10,8 +16,9 @@ fn message() -> v1::Block {
             sphere_radius_m: f64::INFINITY,
             ..v1::World::default()
         }),
-        vertices_m: vec![0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 1.0, 1.0, 0.5],
-        corners: vec![0, 0, 0, 1, 2, 0],
+        mesh: Some(mesh::pack(
+            TRIANGLES.map(|t| t.map(|c| c.to_array())).into_iter(),
+        )),
         runs: vec![
             v1::TriangleRun {
                 triangles: 1,
@@ -34,31 +41,68 @@ fn message() -> v1::Block {
 #[test]
 fn triangles_and_elements_are_where_they_were() {
     let block = Block::new(&message()).unwrap();
-    let [a, b, c, d] = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::new(1.0, 1.0, 0.5)];
-    assert_eq!(block.soup.triangles(), [[a, b, c], [c, b, d]]);
+    assert_eq!(block.soup.triangles(), TRIANGLES);
     assert_eq!(block.first, [0, 4, 5]);
-    assert_eq!(block.seen_as[..10], [2, 3, 4, 5, 6, 7, 8, 9, 16, 17]);
+    assert_eq!(block.divisions, [2, 1]);
     assert_eq!(block.solid, [true, true, true, true, false]);
-    assert_eq!(block.rows, 8);
+    assert_eq!(block.rows(), 8);
+    let numbers: Vec<u32> = (0..10).map(|local| block.number_of(local)).collect();
+    assert_eq!(numbers, [2, 3, 4, 5, 6, 7, 8, 9, 16, 17]);
+    let rows: Vec<Option<u32>> = (0..10).map(|local| block.row_of(local)).collect();
+    let expected: Vec<Option<u32>> = (0..8).map(Some).chain([None, None]).collect();
+    assert_eq!(rows, expected);
+}
+
+#[test]
+fn a_whole_scene_is_numbered_as_its_parts_are() {
+    let mut message = message();
+    for run in &mut message.runs {
+        (run.owned, run.skipped_elements) = (true, 0);
+    }
+    if let Some(world) = &mut message.world {
+        world.elements = 5;
+        world.soil = Some(v1::SoilPlane {
+            cell_x_m: 0.5,
+            cell_y_m: 1.0,
+            cells_x: 2,
+            cells_y: 1,
+            ..v1::SoilPlane::default()
+        });
+    }
+    message.owned_soil_cells = vec![0, 1];
+    let whole = Block::new(&message).unwrap();
+    message.owned_soil_cells.pop();
+    let part = Block::new(&message).unwrap();
+    assert_eq!((whole.rows(), part.rows()), (12, 11));
+    assert_eq!(whole.local_ends(), part.local_ends());
+    for local in 0..whole.local_ends() {
+        assert_eq!(whole.number_of(local), part.number_of(local));
+        let of_both = (whole.row_of(local), part.row_of(local));
+        let last = u32::from(local == 11);
+        assert!(of_both.0 == of_both.1 || last == 1, "{local}: {of_both:?}");
+    }
 }
 
 #[test]
 fn what_is_not_there_is_refused() {
     type Spoil = fn(&mut v1::Block);
-    let spoilt: [(Spoil, &str); 10] = [
-        (|b| b.corners[3] = 4, "corners out of range"),
-        (|b| b.corners[3] = u32::MAX, "corners out of range"),
-        (|b| b.corners[3] = 0, "corners out of range"),
-        (|b| b.corners[5] = 1, "4 vertices, expected 3"),
-        (|b| b.corners.push(1), "7 corners, expected 6"),
-        (|b| b.vertices_m.push(1.0), "13 coordinates, expected 12"),
-        (|b| b.vertices_m[7] = f64::NAN, "vertices_m out of range"),
+    let spoilt: [(Spoil, &str); 7] = [
+        (|b| b.mesh = None, "without mesh"),
+        (
+            |b| b.mesh = Some(v1::Mesh::default()),
+            "x_m of the mesh cannot be unpacked",
+        ),
         (|b| b.runs[1].triangles = u32::MAX, "triangles in runs"),
         (
             |b| b.runs[1].skipped_elements = u32::MAX,
             "elements out of range",
         ),
         (|b| b.runs[0].divisions = 0, "divisions out of range"),
+        (|b| b.runs[0].divisions = u32::MAX, "divisions out of range"),
+        (
+            |b| b.owned_soil_cells = vec![0],
+            "owned_soil_cells out of range",
+        ),
     ];
     for (spoil, expected) in spoilt {
         let mut message = message();

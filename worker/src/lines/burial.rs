@@ -35,7 +35,7 @@ pub(crate) fn bury(
         if block.is_inside(from) {
             entered = Some((k, depth));
         }
-        let near = to < block.local_faces;
+        let near = block.is_face(to);
         if near || in_gap {
             depth = next.next().map_or(depth, |hit| hit.depth());
         }

@@ -93,7 +93,7 @@ impl<'a> Sight<'a> {
         let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
         let hits = &hits[hits.partition_point(|h| h.depth() < soil_depth)..];
         let bottom = self.bottom(line);
-        let leaves = self.block.seen_as.len() as u32;
+        let leaves = self.block.local_ends();
         looks.push((leaves, hits.last().map_or(bottom, |h| h.face_along())));
         looks.push((
             leaves + 1,

@@ -100,18 +100,19 @@ fn from_triangle(block: &Block, tracer: &Tracer, plan: &Plan, t: usize, looks: &
     };
     let n = block.divisions[t];
     let longest_m = geometry::longest_edge(triangle) / f64::from(n);
+    let element_m2 = geometry::area(triangle) / f64::from(n * n);
     for local in block.first[t]..block.first[t + 1] {
         let above = block.above_soil(t, local);
         let area_m2 = match &above {
-            Above::Part(part) => part.share * block.area_m2[local as usize],
-            Above::Whole | Above::Nothing => block.area_m2[local as usize],
+            Above::Part(part) => part.share * element_m2,
+            Above::Whole | Above::Nothing => element_m2,
         };
         for side in 0..2 {
             let face = 2 * local + side;
-            let global = block.seen_as[face as usize];
-            if !block.has_row(face) {
+            if block.row_of(face).is_none() {
                 continue;
             }
+            let global = block.number_of(face);
             let count = plan.rays_of(area_m2, longest_m, global);
             if count == 0 {
                 continue;
@@ -150,7 +151,7 @@ fn from_soil(
     for cell in cells.start as u32..cells.end as u32 {
         let end = block.ends.soil(cell);
         let row = block.local(end);
-        if !block.has_row(row) {
+        if block.row_of(row).is_none() {
             continue;
         }
         let count = plan.rays_of(

@@ -30,12 +30,6 @@ fn block(triangles: &[[DVec3; 3]], [min, max]: [DVec3; 2], periodic: bool) -> Bl
             sphere_radius_m: f64::INFINITY,
             ..v1::World::default()
         }),
-        vertices_m: triangles
-            .iter()
-            .flatten()
-            .flat_map(|p| p.to_array())
-            .collect(),
-        corners: vec![0; 3 * n],
         runs: vec![v1::TriangleRun {
             triangles: n as u32,
             divisions: 1,
@@ -44,7 +38,7 @@ fn block(triangles: &[[DVec3; 3]], [min, max]: [DVec3; 2], periodic: bool) -> Bl
         }],
         ..v1::Block::default()
     };
-    Block::new(&message).unwrap()
+    Block::of_triangles(&message, triangles.to_vec()).unwrap()
 }
 
 fn seen(tracer: &Tracer, block: &Block, origin: DVec3, direction: DVec3, source: u32) -> u32 {

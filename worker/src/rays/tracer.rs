@@ -91,11 +91,7 @@ impl Tracer {
     /// Whether a ray that sees `face` runs inside something solid (see `lines::burial`): whatever leaves lie
     /// there, the line it lies on meets the inside of something solid first at both ends.
     fn is_buried(&self, block: &Block, ray: &FaceRay, face: u32) -> bool {
-        let Some(solids) = self
-            .solids
-            .as_ref()
-            .filter(|_| ray.face < block.local_faces)
-        else {
+        let Some(solids) = self.solids.as_ref().filter(|_| block.is_face(ray.face)) else {
             return false;
         };
         let from_inside = block.is_inside(ray.face);

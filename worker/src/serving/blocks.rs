@@ -9,7 +9,7 @@ use tonic::Status;
 
 use super::Offer;
 use super::calls::{Master, again};
-use crate::{BASE_BYTES, Block, Tracer};
+use crate::{BASE_BYTES, Block, Demand, Tracer};
 
 /// A block, ready for the kernel.
 pub(super) struct Ready {
@@ -158,9 +158,17 @@ impl Blocks {
     ) -> Result<Arc<Ready>, Status> {
         let size = job.block_bytes as usize;
         let bytes = again(|| master.fetch(worker_id, &job.block_id, size)).await?;
+        let reserved_bytes = job.block_memory_bytes;
         let made = tokio::task::spawn_blocking(move || {
             let message = v1::Block::decode(&bytes[..]).map_err(|e| e.to_string())?;
             drop(bytes);
+            // packed numbers can be many more than bytes: memory is taken only as far as it was announced
+            let taken_bytes = Demand::of_message(&message).block_bytes();
+            if taken_bytes > reserved_bytes {
+                return Err(format!(
+                    "block takes {taken_bytes} bytes of memory, announced were {reserved_bytes}"
+                ));
+            }
             Block::new(&message).map_err(|e| e.to_string())
         });
         let made = made.await.map_err(|e| Status::aborted(e.to_string()))?;
