@@ -66,7 +66,10 @@ fn sample() -> Option<PackedRows> {
         }),
         mesh: None,
         runs: (0..TRIANGLES).map(|t| run(t % 3 == 0)).collect(),
-        owned_soil_cells: (0..4).collect(),
+        owned_soil: vec![v1::CellRun {
+            cells: 4,
+            skipped_cells: 0,
+        }],
     };
     let lines = (0..8).map(|k| {
         let (sin, cos) = (0.3 + 0.7 * f64::from(k)).sin_cos();

@@ -49,7 +49,12 @@ fn block() -> v1::Block {
                 ..v1::TriangleRun::default()
             },
         ],
-        owned_soil_cells: vec![0, 3],
+        owned_soil: [0, 2]
+            .map(|skipped_cells| v1::CellRun {
+                cells: 1,
+                skipped_cells,
+            })
+            .to_vec(),
     }
 }
 

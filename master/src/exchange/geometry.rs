@@ -64,11 +64,42 @@ fn frame(world: &World, block: &BlockOf) -> v1::Block {
         world: Some(world_message(world)),
         mesh: None,
         runs,
-        owned_soil_cells: block.soil_cells.clone(),
+        owned_soil: cell_runs(&block.soil_cells),
     }
+}
+
+/// Runs of cells whose numbers rise.
+fn cell_runs(cells: &[u32]) -> Vec<v1::CellRun> {
+    let mut next = 0;
+    let runs = cells.chunk_by(|a, b| a + 1 == *b).map(|run| {
+        let skipped_cells = run[0] - next;
+        next = run[0] + run.len() as u32;
+        v1::CellRun {
+            cells: run.len() as u32,
+            skipped_cells,
+        }
+    });
+    runs.collect()
 }
 
 fn continues(last: &v1::TriangleRun, run: &v1::TriangleRun) -> bool {
     let alike = |r: &v1::TriangleRun| (r.divisions, r.owned, r.solid);
     run.skipped_elements == 0 && alike(last) == alike(run)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cells_that_follow_one_another_are_a_run() {
+        let run = |skipped_cells, cells| v1::CellRun {
+            cells,
+            skipped_cells,
+        };
+        assert_eq!(cell_runs(&[]), []);
+        assert_eq!(cell_runs(&[0, 1, 2]), [run(0, 3)]);
+        let runs = [run(3, 2), run(2, 1), run(1, 2)];
+        assert_eq!(cell_runs(&[3, 4, 7, 9, 10]), runs);
+    }
 }

@@ -38,15 +38,11 @@ impl Numbering {
             rows: local_faces + ends.soil_cells,
             of_part: None,
         };
-        let is_whole = elements == ends.elements as usize
-            && block.runs.iter().all(|run| run.owned)
-            && block
-                .owned_soil_cells
-                .iter()
-                .copied()
-                .eq(0..ends.soil_cells);
+        let is_whole = owned_cells(block, ends)? == ends.soil_cells
+            && elements == ends.elements as usize
+            && block.runs.iter().all(|run| run.owned);
         if !is_whole {
-            let (numbers, rows) = Numbers::of(block, ends, numbering.local_ends as usize)?;
+            let (numbers, rows) = Numbers::of(block, ends, numbering.local_ends as usize);
             (numbering.of_part, numbering.rows) = (Some(numbers), rows);
         }
         Ok(numbering)
@@ -72,9 +68,20 @@ impl Numbering {
     }
 }
 
+/// How many soil cells have rows; all of them are checked to be in the map.
+fn owned_cells(block: &v1::Block, ends: &Ends) -> Result<u32, BlockFault> {
+    let (mut owned, mut end) = (0, 0u64);
+    for run in &block.owned_soil {
+        end += u64::from(run.skipped_cells) + u64::from(run.cells);
+        require(end <= u64::from(ends.soil_cells), "owned_soil")?;
+        owned += run.cells;
+    }
+    Ok(owned)
+}
+
 impl Numbers {
     /// And the number of rows.
-    fn of(block: &v1::Block, ends: &Ends, local_ends: usize) -> Result<(Self, u32), BlockFault> {
+    fn of(block: &v1::Block, ends: &Ends, local_ends: usize) -> (Self, u32) {
         let (mut seen_as, mut row) = (
             Vec::with_capacity(local_ends),
             Vec::with_capacity(local_ends),
@@ -95,15 +102,16 @@ impl Numbers {
         let local_faces = row.len();
         seen_as.extend(ends.faces()..ends.len() as u32);
         row.resize(seen_as.len(), NO_ROW);
-        require(
-            block.owned_soil_cells.is_sorted_by(|a, b| a < b),
-            "owned_soil_cells",
-        )?;
-        for &cell in &block.owned_soil_cells {
-            require(cell < ends.soil_cells, "owned_soil_cells")?;
-            row[local_faces + cell as usize] = rows;
-            rows += 1;
+        let mut next = local_faces;
+        for run in &block.owned_soil {
+            next += run.skipped_cells as usize;
+            let own = next..next + run.cells as usize;
+            next = own.end;
+            for place in &mut row[own] {
+                *place = rows;
+                rows += 1;
+            }
         }
-        Ok((Self { seen_as, row }, rows))
+        (Self { seen_as, row }, rows)
     }
 }

@@ -34,7 +34,7 @@ fn message() -> v1::Block {
                 ..v1::TriangleRun::default()
             },
         ],
-        owned_soil_cells: Vec::new(),
+        owned_soil: Vec::new(),
     }
 }
 
@@ -69,9 +69,13 @@ fn a_whole_scene_is_numbered_as_its_parts_are() {
             ..v1::SoilPlane::default()
         });
     }
-    message.owned_soil_cells = vec![0, 1];
+    let cells = |cells| v1::CellRun {
+        cells,
+        skipped_cells: 0,
+    };
+    message.owned_soil = vec![cells(1), cells(1)];
     let whole = Block::new(&message).unwrap();
-    message.owned_soil_cells.pop();
+    message.owned_soil.pop();
     let part = Block::new(&message).unwrap();
     assert_eq!((whole.rows(), part.rows()), (12, 11));
     assert_eq!(whole.local_ends(), part.local_ends());
@@ -100,8 +104,13 @@ fn what_is_not_there_is_refused() {
         (|b| b.runs[0].divisions = 0, "divisions out of range"),
         (|b| b.runs[0].divisions = u32::MAX, "divisions out of range"),
         (
-            |b| b.owned_soil_cells = vec![0],
-            "owned_soil_cells out of range",
+            |b| {
+                b.owned_soil.push(v1::CellRun {
+                    cells: 1,
+                    skipped_cells: 0,
+                })
+            },
+            "owned_soil out of range",
         ),
     ];
     for (spoil, expected) in spoilt {
