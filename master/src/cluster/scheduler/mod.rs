@@ -6,102 +6,21 @@
 //! have the same bits.
 
 mod choice;
+mod leases;
 mod solve;
+mod terms;
 #[cfg(test)]
 mod tests;
 mod worker;
 
 use std::collections::BTreeMap;
-use std::time::Duration;
 
-use thiserror::Error;
-
+use leases::{Lease, release};
 use solve::Solve;
 pub use solve::{Outcome, SolveCounts};
+pub use terms::{BlockId, BlockSpec, Id, JobSpec, Leased, Refusal, Rules, Time};
 use worker::Worker;
 pub use worker::{WorkerCounts, WorkerFacts};
-
-/// Content of a block: names it among all solves.
-pub type BlockId = [u8; 32];
-
-/// Numbers of workers, solves and leases; none is used twice.
-pub type Id = u64;
-
-/// A point in time, since any beginning.
-pub type Time = Duration;
-
-/// Times and counts that rule the scheduler.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rules {
-    /// A lease that was not renewed for so long is lost.
-    pub lease: Duration,
-    /// A job that failed or was lost so often on one worker is not given to it again.
-    pub failures_on_a_worker: u32,
-    /// A job that failed or was lost so often altogether fails its solve.
-    pub failures_of_a_job: u32,
-    /// A job is given out a second time when it takes so many times what it should, and at least
-    /// `least_straggle`.
-    pub straggle: f64,
-    /// See `straggle`.
-    pub least_straggle: Duration,
-}
-
-impl Default for Rules {
-    fn default() -> Self {
-        Self {
-            lease: Duration::from_secs(30),
-            failures_on_a_worker: 2,
-            failures_of_a_job: 8,
-            straggle: 2.0,
-            least_straggle: Duration::from_secs(1),
-        }
-    }
-}
-
-/// A job to be done.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct JobSpec {
-    /// Index of its block among those of the solve.
-    pub block: usize,
-    /// What it is expected to take, seconds on one thread.
-    pub cost_s: f64,
-}
-
-/// A block of a solve.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BlockSpec {
-    /// Its content.
-    pub id: BlockId,
-    /// What a worker needs to hold it and to compute its jobs.
-    pub demand: nestrad_worker::Demand,
-}
-
-/// A job in the hands of a worker.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Leased {
-    /// Number of the lease.
-    pub lease: Id,
-    /// Its solve.
-    pub solve: Id,
-    /// Index of the job in the solve.
-    pub job: usize,
-    /// Index of the block in the solve.
-    pub block: usize,
-}
-
-/// Why a worker is turned away.
-#[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
-pub enum Refusal {
-    /// It never joined, left, or was silent for too long.
-    #[error("worker {0} is not known: join anew")]
-    UnknownWorker(Id),
-    /// It never had this lease, or is done with it.
-    #[error("lease {0} is not known")]
-    UnknownLease(Id),
-    /// It has as many jobs as it can compute and return.
-    #[error("worker holds {0} leases: no more at a time")]
-    TooMany(usize),
-}
 
 /// The state of all workers, solves and leases.
 #[derive(Debug)]
@@ -112,17 +31,6 @@ pub struct Scheduler {
     solves: BTreeMap<Id, Solve>,
     leases: BTreeMap<Id, Lease>,
     lost: u64,
-}
-
-/// A job that was given out.
-#[derive(Clone, Copy, Debug)]
-struct Lease {
-    worker: Id,
-    solve: Id,
-    job: usize,
-    since: Time,
-    /// When it is lost; `None` once it is: its result is welcome for as long as the job is not done.
-    until: Option<Time>,
 }
 
 impl Scheduler {
@@ -208,170 +116,6 @@ impl Scheduler {
         blocks.find_map(|(number, block)| Some((block.waiting.first()?.1, number)))
     }
 
-    /// A job for a worker, which holds these blocks; `None` where there is nothing to do now.
-    pub fn lease(
-        &mut self,
-        now: Time,
-        worker: Id,
-        held: &[BlockId],
-    ) -> Result<Option<Leased>, Refusal> {
-        let known = self.contact(now, worker)?;
-        if known.leases.len() >= known.most_leases() {
-            return Err(Refusal::TooMany(known.leases.len()));
-        }
-        let Some((solve, job)) = self.choose(now, worker, held) else {
-            return Ok(None);
-        };
-        let lease = self.new_id();
-        let until = Some(now + self.rules.lease);
-        self.leases.insert(
-            lease,
-            Lease {
-                worker,
-                solve,
-                job,
-                since: now,
-                until,
-            },
-        );
-        if let Some(known) = self.workers.get_mut(&worker) {
-            known.leases.insert(lease);
-        }
-        let Some(of) = self.solves.get_mut(&solve) else {
-            return Ok(None);
-        };
-        of.leased(job, lease);
-        let block = of.jobs[job].spec.block;
-        Ok(Some(Leased {
-            lease,
-            solve,
-            job,
-            block,
-        }))
-    }
-
-    /// The heartbeat of a worker, with the leases that it believes to hold. Gives those of them that are
-    /// not worth going on with.
-    pub fn renew(&mut self, now: Time, worker: Id, leases: &[Id]) -> Result<Vec<Id>, Refusal> {
-        self.contact(now, worker)?;
-        let mut unwanted = Vec::new();
-        for &id in leases {
-            match self.leases.get_mut(&id).filter(|l| l.worker == worker) {
-                Some(lease) if lease.until.is_some() => {
-                    lease.until = Some(now + self.rules.lease);
-                }
-                // lost, but not done yet: its worker is still at it
-                Some(_) => {}
-                None => unwanted.push(id),
-            }
-        }
-        Ok(unwanted)
-    }
-
-    /// Whether a result is wanted, before it is sent. It counts as a heartbeat.
-    pub fn wanted(&mut self, now: Time, worker: Id, lease: Id) -> Result<Option<Leased>, Refusal> {
-        self.contact(now, worker)?;
-        let until = now + self.rules.lease;
-        let Some(held) = self.leases.get_mut(&lease) else {
-            return Ok(None);
-        };
-        if held.worker != worker {
-            return Err(Refusal::UnknownLease(lease));
-        }
-        held.until = held.until.map(|_| until);
-        let (solve, job) = (held.solve, held.job);
-        Ok(self.solves.get(&solve).map(|of| Leased {
-            lease,
-            solve,
-            job,
-            block: of.jobs[job].spec.block,
-        }))
-    }
-
-    /// A result is here, and good; `compute_s` is what the worker says it took. Gives the job that it is
-    /// of, or nothing where another was faster or nobody waits for it.
-    pub fn finish(&mut self, now: Time, worker: Id, lease: Id, compute_s: f64) -> Option<Leased> {
-        self.contact(now, worker).ok()?;
-        let held = self.leases.get(&lease).copied();
-        let held = held.filter(|l| l.worker == worker)?;
-        if let Some(known) = self.workers.get_mut(&held.worker) {
-            known.counts.done += 1;
-        }
-        let solve = self.solves.get_mut(&held.solve)?;
-        solve.took(held.job, compute_s);
-        let used = solve.done(held.job);
-        // other leases of the job are void
-        let (workers, leases) = (&mut self.workers, &mut self.leases);
-        leases.retain(|id, l| {
-            let same = (l.solve, l.job) == (held.solve, held.job);
-            if same {
-                release(workers, l.worker, *id);
-            }
-            !same
-        });
-        used.then_some(Leased {
-            lease,
-            solve: held.solve,
-            job: held.job,
-            block: solve.jobs[held.job].spec.block,
-        })
-    }
-
-    /// A worker does not want, or was not able, to do a job; or its result was refused.
-    pub fn give_back(
-        &mut self,
-        now: Time,
-        worker: Id,
-        lease: Id,
-        failure: Option<&str>,
-    ) -> Result<(), Refusal> {
-        self.contact(now, worker)?;
-        let held = self.leases.get(&lease).filter(|l| l.worker == worker);
-        let held = *held.ok_or(Refusal::UnknownLease(lease))?;
-        self.leases.remove(&lease);
-        release(&mut self.workers, worker, lease);
-        // a lease that is lost has been counted
-        if let Some(reason) = failure.filter(|_| held.until.is_some()) {
-            self.failed(&held, reason);
-        }
-        if let Some(solve) = self.solves.get_mut(&held.solve) {
-            solve.returned(held.job, lease);
-        }
-        Ok(())
-    }
-
-    /// Takes back what is overdue: leases that were not renewed, workers that are silent.
-    pub fn expire(&mut self, now: Time) {
-        let overdue: Vec<Id> = self
-            .leases
-            .iter()
-            .filter(|(_, l)| l.until.is_some_and(|until| until <= now))
-            .map(|(&id, _)| id)
-            .collect();
-        for id in overdue {
-            let Some(lease) = self.leases.get_mut(&id) else {
-                continue;
-            };
-            lease.until = None;
-            let lease = *lease;
-            release(&mut self.workers, lease.worker, id);
-            self.failed(&lease, "was not heard of within the lease time");
-            if let Some(solve) = self.solves.get_mut(&lease.solve) {
-                solve.returned(lease.job, id);
-            }
-        }
-        let silence = 2 * self.rules.lease;
-        let silent: Vec<Id> = self
-            .workers
-            .iter()
-            .filter(|(_, w)| w.heard + silence <= now)
-            .map(|(&id, _)| id)
-            .collect();
-        for worker in silent {
-            self.leave(worker);
-        }
-    }
-
     /// How a solve ended; `None` while it goes on.
     pub fn outcome(&self, solve: Id) -> Option<Outcome> {
         let of = self.solves.get(&solve)?;
@@ -408,38 +152,5 @@ impl Scheduler {
         let known = known.ok_or(Refusal::UnknownWorker(worker))?;
         known.heard = known.heard.max(now);
         Ok(known)
-    }
-
-    fn failed(&mut self, lease: &Lease, reason: &str) {
-        self.lost += 1;
-        let name = match self.workers.get_mut(&lease.worker) {
-            Some(worker) => {
-                worker.counts.lost += 1;
-                *worker.failures.entry((lease.solve, lease.job)).or_default() += 1;
-                worker.facts.name.clone()
-            }
-            None => String::new(),
-        };
-        if let Some(solve) = self.solves.get_mut(&lease.solve) {
-            solve.failed(lease.job, &name, reason, &self.rules);
-        }
-    }
-
-    fn drop_leases_of(&mut self, worker: Id) {
-        let solves = &mut self.solves;
-        self.leases.retain(|&id, lease| {
-            if lease.worker == worker
-                && let Some(solve) = solves.get_mut(&lease.solve)
-            {
-                solve.returned(lease.job, id);
-            }
-            lease.worker != worker
-        });
-    }
-}
-
-fn release(workers: &mut BTreeMap<Id, Worker>, worker: Id, lease: Id) {
-    if let Some(known) = workers.get_mut(&worker) {
-        known.leases.remove(&lease);
     }
 }
