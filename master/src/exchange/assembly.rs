@@ -6,7 +6,7 @@ use bytes::Bytes;
 use nestrad_worker::PackedRows;
 
 use super::jobs::BlockOf;
-use super::join::join;
+use super::join::{LaidOut, join};
 use super::rows::BatchRows;
 use super::split::JobOf;
 use super::{Exchange, ExchangeError, JobCounts, Traced};
@@ -45,6 +45,7 @@ pub struct Assembly<'a> {
     /// Jobs of each batch that are not in.
     missing: Vec<usize>,
     batches: Vec<Option<BatchRows>>,
+    laid_out: LaidOut,
     counters: Traced,
 }
 
@@ -62,6 +63,7 @@ impl<'a> Assembly<'a> {
             jobs,
             missing,
             batches: vec![None; batches as usize],
+            laid_out: LaidOut::default(),
             counters: Traced::default(),
         }
     }
@@ -93,7 +95,7 @@ impl<'a> Assembly<'a> {
         for (job, result) in jobs.take_while(|(job, _)| job.batch == batch) {
             parts[job.block].1.extend(result.take());
         }
-        Ok(join(self.world, &parts)?)
+        Ok(join(self.world, &parts, &mut self.laid_out)?)
     }
 
     /// The exchange, once all jobs are in; `None` before.

@@ -14,10 +14,16 @@ use crate::world::World;
 /// Rows that are sorted together: their counters fit a first-level cache.
 const SORTED_TOGETHER: usize = 1 << 13;
 
+/// Entries of each run of each job, and room for those of the next batch: pages that were never touched take a good
+/// part of the time.
+#[derive(Debug, Default)]
+pub(super) struct LaidOut(Vec<Vec<Vec<u64>>>);
+
 /// Joins the jobs of all blocks of a batch.
 pub(super) fn join(
     world: &World,
     parts: &[(&BlockOf, Vec<JobRows>)],
+    LaidOut(laid_out): &mut LaidOut,
 ) -> Result<BatchRows, PackedFault> {
     let runs = world.rows().div_ceil(SORTED_TOGETHER);
     let rows_of: Vec<Vec<u32>> = parts
@@ -36,9 +42,10 @@ pub(super) fn join(
             })
         })
         .collect();
-    let laid_out: Result<Vec<Vec<Vec<u64>>>, PackedFault> =
-        jobs.par_iter().map(|job| job.lay_out(runs)).collect();
-    let laid_out = laid_out?;
+    laid_out.resize(jobs.len(), Vec::new());
+    jobs.par_iter()
+        .zip(&mut *laid_out)
+        .try_for_each(|(job, laid_out)| job.lay_out(runs, laid_out))?;
     let of_run = |run: usize| -> Vec<&[u64]> { laid_out.iter().map(|job| &job[run][..]).collect() };
     let entries = laid_out.iter().flatten().map(Vec::len).sum();
     let (mut lengths, mut ends) = (vec![0; world.rows()], vec![0; entries]);
@@ -92,14 +99,18 @@ struct Job<'a> {
 
 impl Job<'_> {
     /// The entries of each run: the place of the row in the run, and what it sees.
-    fn lay_out(&self, runs: usize) -> Result<Vec<Vec<u64>>, PackedFault> {
+    fn lay_out(&self, runs: usize, laid_out: &mut Vec<Vec<u64>>) -> Result<(), PackedFault> {
         let shape = Shape {
             rows: self.rows.len() as u32,
             ends: self.ends,
         };
         // most runs have as many, give or take a quarter
         let room = self.of_a_run / 4 * 5;
-        let mut laid_out: Vec<Vec<u64>> = (0..runs).map(|_| Vec::with_capacity(room)).collect();
+        laid_out.resize(runs, Vec::new());
+        for entries in &mut *laid_out {
+            entries.clear();
+            entries.reserve(room);
+        }
         let mut put = |row: u32, end: u32| {
             let (run, place) = (
                 row as usize / SORTED_TOGETHER,
@@ -116,7 +127,6 @@ impl Job<'_> {
             } else {
                 put(row(a), b);
             }
-        })?;
-        Ok(laid_out)
+        })
     }
 }
