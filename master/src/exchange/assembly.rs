@@ -100,6 +100,8 @@ impl<'a> Assembly<'a> {
 
     /// The exchange, once all jobs are in; `None` before.
     pub fn finish(self, jobs: JobCounts) -> Option<Exchange> {
+        // halves are joined in the room that it leaves
+        drop(self.laid_out);
         let batches: Option<Vec<BatchRows>> = self.batches.into_iter().collect();
         Some(Exchange::of_batches(batches?, self.counters, jobs))
     }
