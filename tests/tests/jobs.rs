@@ -60,6 +60,9 @@ fn by_jobs(
     let mut assembly = Assembly::new(world, blocks, jobs.clone(), sampling.batches);
     for (block, of) in blocks.iter().enumerate() {
         let message = block_message(&problem.scene, world, of);
+        // a worker refuses a block that takes more than the master announces
+        let announced = demand(world, of, sampling).block_bytes();
+        assert!(Demand::of_message(&message).block_bytes() <= announced);
         let geometry = nestrad_worker::Block::new(&message).unwrap();
         let tracer = nestrad_worker::Tracer::new(&geometry);
         for (k, job) in jobs

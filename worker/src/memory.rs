@@ -82,3 +82,31 @@ impl Demand {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_of_few_bytes_can_be_a_large_block() {
+        let run = v1::TriangleRun {
+            triangles: u32::MAX,
+            divisions: 100,
+            ..v1::TriangleRun::default()
+        };
+        let mut block = v1::Block {
+            mesh: Some(v1::Mesh {
+                triangles: 7,
+                vertices: 30,
+                ..v1::Mesh::default()
+            }),
+            ..v1::Block::default()
+        };
+        // ten triangles can have as many vertices
+        assert_eq!(Demand::of_message(&block).triangles, 10);
+        block.runs = vec![run; 3];
+        let demand = Demand::of_message(&block);
+        assert_eq!(demand.elements, u64::from(u32::MAX));
+        assert!(demand.block_bytes() > 70 << 30);
+    }
+}
