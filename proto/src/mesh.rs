@@ -44,12 +44,12 @@ fn packed<T: Number>(numbers: &[T]) -> Vec<u8> {
 #[derive(Clone, Debug, Error, PartialEq, Eq)]
 pub enum MeshFault {
     /// These are no packed numbers.
-    #[error("{what} of the mesh cannot be unpacked: {source}")]
+    #[error("{what} of the mesh cannot be unpacked: {reason}")]
     Packing {
         /// What is packed.
         what: &'static str,
         /// What is wrong with it.
-        source: PcoError,
+        reason: PcoError,
     },
     /// There are more numbers than announced, or fewer.
     #[error("mesh with {found} {what}, expected {expected}")]
@@ -112,7 +112,7 @@ fn unpacked<T: Number>(
     expected: usize,
     what: &'static str,
 ) -> Result<Vec<T>, MeshFault> {
-    let fault = |source| MeshFault::Packing { what, source };
+    let fault = |reason| MeshFault::Packing { what, reason };
     let (file, mut rest) = FileDecompressor::new(packed).map_err(fault)?;
     let mut numbers: Vec<T> = Vec::new();
     while let DecompressorItem::Chunk(mut chunk) = file.chunk_decompressor(rest).map_err(fault)? {
@@ -237,7 +237,6 @@ mod tests {
     #[test]
     fn what_is_not_there_is_refused() {
         type Spoil = fn(&mut v1::Mesh);
-        let corners = |of: &[u32]| packed(of);
         let spoilt: [(Spoil, &str); 8] = [
             (
                 |m| m.corners = packed(&[0u32, 0, 4, 2, 1, 0]),
@@ -266,7 +265,7 @@ mod tests {
                 "y_m out of range",
             ),
         ];
-        assert_eq!(pack(strip(2)).corners, corners(&[0, 0, 0, 2, 1, 0]));
+        assert_eq!(pack(strip(2)).corners, packed(&[0u32, 0, 0, 2, 1, 0]));
         for (spoil, expected) in spoilt {
             let mut mesh = pack(strip(2));
             spoil(&mut mesh);
@@ -298,8 +297,7 @@ mod tests {
             let mut mesh = pack(strip(30));
             for (of, at, byte) in wrong {
                 let packed = [&mut mesh.x_m, &mut mesh.y_m, &mut mesh.z_m, &mut mesh.corners];
-                let [x, y, z, corners] = packed;
-                let bytes = [x, y, z, corners].into_iter().nth(of).unwrap();
+                let bytes = packed.into_iter().nth(of).unwrap();
                 let at = at.index(bytes.len());
                 bytes[at] = byte;
             }

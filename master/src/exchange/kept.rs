@@ -26,6 +26,7 @@ pub fn trace_kept(
     progress: &Progress,
 ) -> Result<Exchange, ExchangeError> {
     let blocks = [BlockOf::whole(world)];
+    // named as what workers compute of it: either serves the other
     let message = block_message(scene, world, &blocks[0]).encode_to_vec();
     let id = *blake3::hash(&message).as_bytes();
     drop(message);

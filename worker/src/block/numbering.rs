@@ -80,7 +80,7 @@ fn owned_cells(block: &v1::Block, ends: &Ends) -> Result<u32, BlockFault> {
 }
 
 impl Numbers {
-    /// And how many rows there are.
+    /// The numbers of a part of the scene, and how many rows it has.
     fn of(block: &v1::Block, ends: &Ends, local_ends: usize) -> (Self, u32) {
         let (mut seen_as, mut row) = (
             Vec::with_capacity(local_ends),
