@@ -1,7 +1,7 @@
 """A master of nestrad, for programs that hold their canopy in numpy arrays.
 
 Lengths in metres, irradiances in W m-2, powers in W; z points up. Stubs are made from the .proto files
-by `set_up`; client.proto documents every field.
+by `set_up`; they document every field.
 """
 
 from dataclasses import dataclass, field
@@ -9,6 +9,8 @@ from dataclasses import dataclass, field
 import grpc
 import numpy as np
 from nestrad.v1 import client_pb2 as pb
+from nestrad.v1 import results_pb2 as results_pb
+from nestrad.v1 import scene_pb2 as scene_pb
 from nestrad.v1.client_pb2_grpc import SolveServiceStub
 
 LEAF, STEM, SOIL = range(3)
@@ -96,7 +98,7 @@ class Master:
         """Hands in other light and optics for a geometry that the master holds."""
         header = _header(bands, sources)
         header.geometry_id = geometry_id
-        return self._upload([pb.SceneSlice(header=header)])
+        return self._upload([scene_pb.SceneSlice(header=header)])
 
     def _upload(self, slices):
         return self._stub.UploadScene(iter(slices), metadata=self._metadata)
@@ -127,21 +129,21 @@ class Master:
 
     def organs(self, solve_id):
         """Light per organ of a finished solve."""
-        slices = [slice.organs for slice in self._fetch(solve_id, pb.RESULT_TABLE_ORGANS)]
+        slices = [slice.organs for slice in self._fetch(solve_id, results_pb.RESULT_TABLE_ORGANS)]
         organs = Organs(bands=list(slices[0].bands))
         shape = (-1, len(organs.bands))
         for slice in slices:
             organs.plant += slice.plant
             organs.organ += slice.id
         organs.area_m2 = np.concatenate([slice.area_m2 for slice in slices])
-        for column in pb.ItemLight.DESCRIPTOR.fields_by_name:
+        for column in results_pb.ItemLight.DESCRIPTOR.fields_by_name:
             values = np.concatenate([getattr(slice.light, column) for slice in slices])
             setattr(organs, column, values.reshape(shape))
         return organs
 
     def summary(self, solve_id):
         """Energy balance, errors and cost of a finished solve: a SolveSummary."""
-        return next(self._fetch(solve_id, pb.RESULT_TABLE_SUMMARY)).summary
+        return next(self._fetch(solve_id, results_pb.RESULT_TABLE_SUMMARY)).summary
 
     def _fetch(self, solve_id, table):
         request = pb.FetchResultsRequest(solve_id=solve_id, table=table)
@@ -149,13 +151,13 @@ class Master:
 
 
 def _header(bands, sources):
-    header = pb.SceneHeader()
+    header = scene_pb.SceneHeader()
     for band in bands:
         header.bands.add(
             name=band.name,
             soil_albedo=band.soil_albedo,
             materials=[
-                pb.MaterialOptics(rho_upper=a, tau_upper=b, rho_lower=c, tau_lower=d)
+                scene_pb.MaterialOptics(rho_upper=a, tau_upper=b, rho_lower=c, tau_lower=d)
                 for a, b, c, d in np.asarray(band.optics)
             ],
         )
@@ -175,21 +177,21 @@ def _slices(geometry, bands, sources):
         new.materials.add(name=name, kind=kind)
     if geometry.pattern_m is not None:
         names = ("min_x_m", "min_y_m", "max_x_m", "max_y_m")
-        new.pattern.CopyFrom(pb.PatternRectangle(**dict(zip(names, geometry.pattern_m))))
+        new.pattern.CopyFrom(scene_pb.PatternRectangle(**dict(zip(names, geometry.pattern_m))))
     if geometry.soil_z_m is not None:
         new.soil_z_m = geometry.soil_z_m
-    yield pb.SceneSlice(header=header)
+    yield scene_pb.SceneSlice(header=header)
 
     for first in range(0, len(geometry.organs), _ORGANS):
         plants, organs = zip(*geometry.organs[first : first + _ORGANS])
-        yield pb.SceneSlice(organs=pb.OrganSlice(first=first, plant=plants, id=organs))
+        yield scene_pb.SceneSlice(organs=scene_pb.OrganSlice(first=first, plant=plants, id=organs))
 
     for first in range(0, len(geometry.vertices_m), _TRIANGLES):
         part = slice(first, first + _TRIANGLES)
-        triangles = pb.TriangleSlice(
+        triangles = scene_pb.TriangleSlice(
             first=first,
             vertices_m=np.asarray(geometry.vertices_m[part], float).ravel().tolist(),
             organ=np.asarray(geometry.organ[part]).tolist(),
             material=np.asarray(geometry.material[part]).tolist(),
         )
-        yield pb.SceneSlice(triangles=triangles)
+        yield scene_pb.SceneSlice(triangles=triangles)
