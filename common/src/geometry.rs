@@ -25,6 +25,13 @@ pub fn bounds<'a>(points: impl IntoIterator<Item = &'a DVec3>) -> Option<(DVec3,
     })
 }
 
+/// The same of the corners of triangles.
+pub fn bounds_of(triangles: impl IntoIterator<Item = [DVec3; 3]>) -> Option<(DVec3, DVec3)> {
+    let of_one = |t: [DVec3; 3]| (t[0].min(t[1]).min(t[2]), t[0].max(t[1]).max(t[2]));
+    let join = |(a, b): (DVec3, DVec3), (c, d): (DVec3, DVec3)| (a.min(c), b.max(d));
+    triangles.into_iter().map(of_one).reduce(join)
+}
+
 /// The point of the part of a triangle with these corners (barycentric coordinates of its second and
 /// third vertex) that two numbers in [0, 1) stand for; uniform numbers give uniform points.
 pub fn point_within(

@@ -6,10 +6,11 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 
-use crate::assemble::Origins;
-use crate::scene::{Material, Scene};
+use crate::canopy::{Canopy, Material};
+use crate::formats::Origins;
+use crate::geometry::{area, longest_edge};
 
-/// Facts of a scene. Lengths in metres, in the user's coordinates.
+/// Facts of a canopy. Lengths in metres, in the user's coordinates.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Inspection {
     /// As given, soil triangles included.
@@ -29,7 +30,7 @@ pub struct Inspection {
     /// Height of the soil plane.
     pub soil_z_m: Option<f64>,
     /// One-sided area of all but soil per area of ground: of the pattern, or of the box around an
-    /// isolated scene. `None` where that ground has no area.
+    /// isolated canopy. `None` where that ground has no area.
     pub area_index: Option<f64>,
     /// One-sided area of the smallest triangle, degenerate ones left out, m².
     pub smallest_m2: f64,
@@ -41,7 +42,7 @@ pub struct Inspection {
     pub duplicates: usize,
     /// Triangles that reach below the soil plane.
     pub below_soil: usize,
-    /// How far the scene reaches beyond the pattern's edge; 0 for an isolated scene. It comes in
+    /// How far the scene reaches beyond the pattern's edge; 0 for an isolated canopy. It comes in
     /// again on the other side.
     pub overhang_m: f64,
     /// Each a sentence, lower-case.
@@ -62,43 +63,43 @@ pub struct MaterialFacts {
 /// Beyond this distance the user's coordinates, as doubles, are coarser than a micrometre.
 const FAR_M: f64 = 1e-6 / f64::EPSILON;
 
-/// Looks through a scene; `origins` serves to name file and line in the warnings.
-pub fn inspect(scene: &Scene, origins: &Origins) -> Inspection {
+/// Looks through a canopy; `origins` serves to name file and line in the warnings.
+pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
     let mut facts = Inspection {
-        triangles: scene.triangles.len(),
-        organs: scene.organs.len(),
-        plants: scene
+        triangles: canopy.len(),
+        organs: canopy.organs.len(),
+        plants: canopy
             .organs
             .iter()
             .map(|organ| &organ.plant)
             .collect::<BTreeSet<_>>()
             .len(),
-        pattern_m: scene.pattern.map(|pattern| pattern.size_m.to_array()),
-        soil_z_m: scene.soil_z_m.map(|z| z + scene.origin_m.z),
+        pattern_m: canopy.pattern.map(|pattern| pattern.size_m.to_array()),
+        soil_z_m: canopy.soil_z_m.map(|z| z + canopy.origin_m.z),
         ..Inspection::default()
     };
-    let (lower, upper) = bounds(scene);
-    facts.lower_m = (lower + scene.origin_m).to_array();
-    facts.upper_m = (upper + scene.origin_m).to_array();
-    facts.overhang_m = scene.pattern.map_or(0.0, |pattern| {
+    let (lower, upper) = canopy.bounds_m();
+    facts.lower_m = (lower + canopy.origin_m).to_array();
+    facts.upper_m = (upper + canopy.origin_m).to_array();
+    facts.overhang_m = canopy.pattern.map_or(0.0, |pattern| {
         let below = pattern.min_m - lower.truncate();
         let beyond = upper.truncate() - (pattern.min_m + pattern.size_m);
         below.max(beyond).max_element().max(0.0)
     });
 
-    facts.areas(scene, origins, (upper - lower).truncate());
-    facts.find_duplicates(scene, origins);
-    facts.find_below_soil(scene, origins);
-    let farthest = (lower + scene.origin_m)
+    facts.areas(canopy, origins, (upper - lower).truncate());
+    facts.find_duplicates(canopy, origins);
+    facts.find_below_soil(canopy, origins);
+    let farthest = (lower + canopy.origin_m)
         .abs()
-        .max((upper + scene.origin_m).abs());
+        .max((upper + canopy.origin_m).abs());
     if farthest.max_element() > FAR_M {
         facts.warnings.push(format!(
             "coordinates reach {} m from zero, where they are rounded to more than a micrometre",
             farthest.max_element()
         ));
     }
-    if let Some(pattern) = scene.pattern
+    if let Some(pattern) = canopy.pattern
         && facts.overhang_m > 10.0 * pattern.size_m.max_element()
     {
         facts.warnings.push(format!(
@@ -110,24 +111,23 @@ pub fn inspect(scene: &Scene, origins: &Origins) -> Inspection {
 }
 
 impl Inspection {
-    fn areas(&mut self, scene: &Scene, origins: &Origins, extent: DVec2) {
+    fn areas(&mut self, canopy: &Canopy, origins: &Origins, extent: DVec2) {
         let new = |material: &Material| MaterialFacts {
             name: material.to_string(),
             triangles: 0,
             area_m2: 0.0,
         };
-        self.materials = scene.materials.iter().map(new).collect();
+        self.materials = canopy.materials.iter().map(new).collect();
         let mut smallest = f64::INFINITY;
         let mut first_degenerate = None;
-        for (index, (triangle, &material)) in
-            scene.triangles.iter().zip(&scene.material).enumerate()
-        {
-            let area = area_m2(triangle);
-            let of = &mut self.materials[material as usize];
+        for (index, triangle) in canopy.triangles().enumerate() {
+            let corners = &triangle.corners_m;
+            let area = area(corners);
+            let of = &mut self.materials[triangle.material as usize];
             of.triangles += 1;
             of.area_m2 += area;
             self.largest_m2 = self.largest_m2.max(area);
-            if area > rounding_m2(triangle, scene.origin_m) {
+            if area > rounding_m2(corners, canopy.origin_m) {
                 smallest = smallest.min(area);
             } else {
                 self.degenerate += 1;
@@ -145,8 +145,8 @@ impl Inspection {
                 first,
             );
         }
-        let ground = scene.pattern.map_or(extent.x * extent.y, |p| p.area_m2());
-        let materials = self.materials.iter().zip(&scene.materials);
+        let ground = canopy.pattern.map_or(extent.x * extent.y, |p| p.area_m2());
+        let materials = self.materials.iter().zip(&canopy.materials);
         let plants: f64 = materials
             .filter(|(_, material)| **material != Material::Soil)
             .map(|(facts, _)| facts.area_m2)
@@ -154,12 +154,11 @@ impl Inspection {
         self.area_index = (ground > 0.0).then(|| plants / ground);
     }
 
-    fn find_duplicates(&mut self, scene: &Scene, origins: &Origins) {
-        let mut hashed: Vec<(u64, u32)> = scene
-            .triangles
-            .iter()
+    fn find_duplicates(&mut self, canopy: &Canopy, origins: &Origins) {
+        let mut hashed: Vec<(u64, u32)> = canopy
+            .corners_m()
             .zip(0..)
-            .map(|(triangle, index)| (hash(&sorted(triangle)), index))
+            .map(|(corners, index)| (hash(&sorted(&corners)), index))
             .collect();
         hashed.sort_unstable();
         let mut first = None;
@@ -171,7 +170,8 @@ impl Inspection {
             let mut seen = HashMap::new();
             for &(_, index) in run {
                 let index = index as usize;
-                let times = seen.entry(sorted(&scene.triangles[index])).or_insert(0);
+                let vertices = sorted(&canopy.triangle(index).corners_m);
+                let times = seen.entry(vertices).or_insert(0);
                 *times += 1;
                 if *times > 1 {
                     self.duplicates += 1;
@@ -189,13 +189,14 @@ impl Inspection {
         }
     }
 
-    fn find_below_soil(&mut self, scene: &Scene, origins: &Origins) {
-        let Some(soil) = scene.soil_z_m else {
+    fn find_below_soil(&mut self, canopy: &Canopy, origins: &Origins) {
+        let Some(soil) = canopy.soil_z_m else {
             return;
         };
-        let below = |triangle: &[DVec3; 3]| triangle.iter().any(|vertex| vertex.z < soil);
-        let mut found = (0..scene.triangles.len()).filter(|&i| below(&scene.triangles[i]));
-        if let Some(first) = found.next() {
+        let below = |corners: &[DVec3; 3]| corners.iter().any(|vertex| vertex.z < soil);
+        let corners = canopy.corners_m().enumerate();
+        let mut found = corners.filter(|(_, corners)| below(corners));
+        if let Some((first, _)) = found.next() {
             self.below_soil = 1 + found.count();
             self.warn(
                 self.below_soil,
@@ -214,22 +215,9 @@ impl Inspection {
     }
 }
 
-fn bounds(scene: &Scene) -> (DVec3, DVec3) {
-    scene.triangles.iter().flatten().fold(
-        (DVec3::INFINITY, DVec3::NEG_INFINITY),
-        |(lower, upper), vertex| (lower.min(*vertex), upper.max(*vertex)),
-    )
-}
-
-fn area_m2(triangle: &[DVec3; 3]) -> f64 {
-    let [a, b, c] = *triangle;
-    0.5 * (b - a).cross(c - a).length()
-}
-
 /// The area that rounding the user's coordinates to doubles could have made of nothing.
 fn rounding_m2(triangle: &[DVec3; 3], origin: DVec3) -> f64 {
-    let [a, b, c] = *triangle;
-    let longest = (b - a).length().max((c - b).length()).max((a - c).length());
+    let longest = longest_edge(triangle);
     let farthest = triangle
         .iter()
         .map(|vertex| (*vertex + origin).abs().max_element())

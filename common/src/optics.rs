@@ -63,6 +63,12 @@ impl LeafOptics {
         }
     }
 
+    /// What of the light that arrives on a face stays.
+    pub fn absorptance(&self, upper: bool) -> f64 {
+        let face = if upper { self.upper } else { self.lower };
+        face.absorptance()
+    }
+
     /// Refuses what is not physical: negative, not finite, or `rho + tau > 1` on a face.
     pub fn check(&self) -> Result<(), OpticsFault> {
         self.upper.check()?;
@@ -75,6 +81,30 @@ impl LeafOptics {
     }
 }
 
+/// The optical properties of a canopy in every band.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Optics {
+    /// In the user's order; at least one.
+    pub bands: Vec<Band>,
+}
+
+impl Optics {
+    /// Number of bands.
+    pub fn len(&self) -> usize {
+        self.bands.len()
+    }
+
+    /// No bands at all.
+    pub fn is_empty(&self) -> bool {
+        self.bands.is_empty()
+    }
+
+    /// Names of the bands, in order.
+    pub fn names(&self) -> Vec<&str> {
+        self.bands.iter().map(|band| band.name.as_str()).collect()
+    }
+}
+
 /// A named wavelength band: the properties of every material and of the soil in it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Band {
@@ -82,7 +112,7 @@ pub struct Band {
     pub name: String,
     /// Lambertian albedo of the soil plane, 0 to 1.
     pub soil_albedo: f64,
-    /// One entry per material, in the order of [`crate::scene::Scene::materials`].
+    /// One entry per material, in the order of [`crate::canopy::Canopy::materials`].
     pub materials: Vec<LeafOptics>,
 }
 

@@ -7,6 +7,7 @@ use std::fs;
 use std::path::PathBuf;
 
 use nestrad_common::assemble::{Loaded, load};
+use nestrad_common::geometry::area;
 use nestrad_common::formats::{can, read};
 use nestrad_common::inputs::{BandInput, Inputs, LightInput, PatternInput};
 
@@ -47,22 +48,19 @@ fn sample_scenes_have_the_organs_and_areas_of_the_reference() {
         ("bean_rows", -0.01, 117_915, 5.4),
     ] {
         let Loaded {
-            problem,
-            inspection,
-            ..
+            scene, inspection, ..
         } = rows(&folder, name, soil);
         assert_eq!(inspection.triangles, triangles);
         assert_eq!(inspection.plants, 8);
         assert!((inspection.area_index.unwrap() - area_index).abs() < 0.06);
-        assert_eq!(problem.sources.len(), 47);
-        assert_eq!(problem.bands[1].materials[1].lower.rho, 0.46);
+        assert_eq!(scene.light.suns.len(), 47);
+        assert_eq!(scene.optics.bands[1].materials[1].lower.rho, 0.46);
 
         let mut areas: HashMap<&str, f64> = HashMap::new();
-        let scene = &problem.scene;
-        for (triangle, &organ) in scene.triangles.iter().zip(&scene.organ) {
-            let [a, b, c] = *triangle;
-            let area = 0.5 * (b - a).cross(c - a).length();
-            *areas.entry(&scene.organs[organ as usize].id).or_default() += area;
+        let canopy = &scene.canopy;
+        for triangle in canopy.triangles() {
+            let id = &canopy.organs[triangle.organ as usize].id;
+            *areas.entry(id).or_default() += area(&triangle.corners_m);
         }
         let table = folder.join(format!("reference/{name}.clear.organs.csv"));
         let table = fs::read_to_string(table).unwrap();
@@ -88,10 +86,10 @@ fn a_large_canopy_is_read_in_no_time() {
     let start = std::time::Instant::now();
     let bytes = read::read(&path, read::MAX_GEOMETRY_BYTES).unwrap();
     let unpacked = start.elapsed();
-    let mesh = can::parse("bean_rows.can.gz", &bytes).unwrap();
+    let file = can::parse("bean_rows.can.gz", &bytes).unwrap();
     let all = start.elapsed();
     eprintln!("unpacked in {unpacked:?}, parsed after {all:?}");
-    assert_eq!(mesh.triangles.len(), 117_915);
+    assert_eq!(file.mesh.len(), 117_915);
     // 0.1 s of work: the bound leaves room for a busy machine
     assert!(all.as_secs_f64() < 3.0, "{all:?}");
 }

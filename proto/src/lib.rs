@@ -5,11 +5,10 @@
 
 pub mod access;
 pub mod authority;
-mod bits;
 pub mod channel;
 pub mod guard;
-pub mod mesh;
-pub mod packed;
+mod mesh;
+pub mod near_field;
 pub mod token;
 
 /// Version 1 of the protocol.

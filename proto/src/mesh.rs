@@ -1,5 +1,7 @@
 //! Triangles as they travel; see `Mesh` in `near_field.proto`. Every worker needs them: they are to be small.
 
+use glam::DVec3;
+use nestrad_common::canopy::Welder;
 use pco::ChunkConfig;
 use pco::data_types::Number;
 use pco::errors::PcoError;
@@ -8,30 +10,28 @@ use thiserror::Error;
 
 use crate::v1;
 
-/// Coordinates of the corners of a triangle, metres.
-pub type Triangle = [[f64; 3]; 3];
-
-/// Packs triangles in their order.
-pub fn pack(triangles: impl ExactSizeIterator<Item = Triangle>) -> v1::Mesh {
+/// Packs triangles (vertices in metres) in their order.
+pub(crate) fn pack(triangles: impl ExactSizeIterator<Item = [DVec3; 3]>) -> v1::Mesh {
     let count = triangles.len();
-    let mut vertices = Vertices::new(count);
-    triangles.flatten().for_each(|corner| vertices.add(corner));
-    let Vertices {
-        coordinates_m: [x, y, z],
-        corners,
-        ..
-    } = vertices;
-    let (((x_m, y_m), z_m), packed) = rayon::join(
-        || rayon::join(|| rayon::join(|| packed(&x), || packed(&y)), || packed(&z)),
+    let (mut welder, mut vertices) = (Welder::default(), Vec::new());
+    let mut corners = Vec::with_capacity(3 * count);
+    for vertex in triangles.flatten() {
+        let used = vertices.len() as u32;
+        let number = welder.number(vertex, &mut vertices);
+        corners.push(used - number.min(used));
+    }
+    let axis = |axis: usize| packed(&vertices.iter().map(|v| v[axis]).collect::<Vec<f64>>());
+    let (((x_m, y_m), z_m), corners) = rayon::join(
+        || rayon::join(|| rayon::join(|| axis(0), || axis(1)), || axis(2)),
         || packed(&corners),
     );
     v1::Mesh {
         triangles: count as u32,
-        vertices: x.len() as u32,
+        vertices: vertices.len() as u32,
         x_m,
         y_m,
         z_m,
-        corners: packed,
+        corners,
     }
 }
 
@@ -71,12 +71,11 @@ pub enum MeshFault {
 
 /// Unpacks what [`pack`] packed; nothing in it is trusted, but for how many triangles and vertices there are to
 /// be: memory is taken for as many at most.
-pub fn unpack<P: From<[f64; 3]> + Copy>(mesh: &v1::Mesh) -> Result<Vec<[P; 3]>, MeshFault> {
-    let vertices = vertices::<P>(mesh)?;
+pub(crate) fn unpack<T: FromIterator<[DVec3; 3]>>(mesh: &v1::Mesh) -> Result<T, MeshFault> {
+    let vertices = vertices(mesh)?;
     let corners = unpacked::<u32>(&mesh.corners, 3 * mesh.triangles as usize, "corners")?;
-    let mut triangles = Vec::with_capacity(corners.len() / 3);
     let mut used = 0;
-    for &of in corners.as_chunks::<3>().0 {
+    let triangle = |of: &[u32; 3]| {
         let places = of.map(|back| {
             used += usize::from(back == 0);
             // the last vertex that was used stands before `used`
@@ -85,13 +84,15 @@ pub fn unpack<P: From<[f64; 3]> + Copy>(mesh: &v1::Mesh) -> Result<Vec<[P; 3]>, 
         let [Some(&a), Some(&b), Some(&c)] = places.map(|place| vertices.get(place)) else {
             return Err(MeshFault::Range { what: "corners" });
         };
-        triangles.push([a, b, c]);
-    }
+        Ok([a, b, c])
+    };
+    let triangles = corners.as_chunks::<3>().0.iter().map(triangle);
+    let triangles = triangles.collect::<Result<T, MeshFault>>()?;
     counted("vertices", used, vertices.len())?;
     Ok(triangles)
 }
 
-fn vertices<P: From<[f64; 3]>>(mesh: &v1::Mesh) -> Result<Vec<P>, MeshFault> {
+fn vertices(mesh: &v1::Mesh) -> Result<Vec<DVec3>, MeshFault> {
     let axis = |packed: &[u8], what| {
         let numbers = unpacked::<f64>(packed, mesh.vertices as usize, what)?;
         if numbers.iter().all(|x| x.is_finite()) {
@@ -103,7 +104,7 @@ fn vertices<P: From<[f64; 3]>>(mesh: &v1::Mesh) -> Result<Vec<P>, MeshFault> {
     let y = axis(&mesh.y_m, "y_m")?;
     let z = axis(&mesh.z_m, "z_m")?;
     let points = x.iter().zip(&y).zip(&z);
-    Ok(points.map(|((&x, &y), &z)| P::from([x, y, z])).collect())
+    Ok(points.map(|((&x, &y), &z)| DVec3::new(x, y, z)).collect())
 }
 
 /// So many numbers, chunk by chunk: none is begun that holds more.
@@ -140,87 +141,17 @@ fn counted(what: &'static str, found: usize, expected: usize) -> Result<(), Mesh
     })
 }
 
-/// Vertices of a mesh, of which most are corners of several triangles that stand close together in it.
-struct Vertices {
-    coordinates_m: [Vec<f64>; 3],
-    corners: Vec<u32>,
-    /// The last vertex with each hash, counted from 1.
-    last: Vec<u32>,
-}
-
-/// Bits of a hash: as many places are searched for a vertex.
-const HASH_BITS: u32 = 16;
-
-impl Vertices {
-    fn new(triangles: usize) -> Self {
-        Self {
-            coordinates_m: [(); 3].map(|()| Vec::with_capacity(triangles)),
-            corners: Vec::with_capacity(3 * triangles),
-            last: vec![0; 1 << HASH_BITS],
-        }
-    }
-
-    fn add(&mut self, point: [f64; 3]) {
-        let bits = point.map(f64::to_bits);
-        let used = self.coordinates_m[0].len() as u32;
-        let last = &mut self.last[hash(bits)];
-        if *last > 0 {
-            let number = *last as usize - 1;
-            let known = self.coordinates_m.each_ref().map(|of| of[number].to_bits());
-            if known == bits {
-                self.corners.push(used + 1 - *last);
-                return;
-            }
-        }
-        *last = used + 1;
-        self.corners.push(0);
-        for (coordinates, x) in self.coordinates_m.iter_mut().zip(point) {
-            coordinates.push(x);
-        }
-    }
-}
-
-fn hash(bits: [u64; 3]) -> usize {
-    // multiplicative hashing (Knuth) of each coordinate by an odd number of its own
-    let [x, y, z] = bits;
-    let mixed = x
-        .wrapping_mul(0x9e37_79b9_7f4a_7c15)
-        .wrapping_add(y.wrapping_mul(0xc2b2_ae3d_27d4_eb4f))
-        .wrapping_add(z.wrapping_mul(0x1656_67b1_9e37_79f9));
-    (mixed >> (64 - HASH_BITS)) as usize
-}
-
 #[cfg(test)]
 mod tests {
     use proptest::prelude::*;
 
     use super::*;
 
-    #[test]
-    fn a_vertex_is_written_once() {
-        let mut vertices = Vertices::new(2);
-        for point in [
-            [0.0; 3],
-            [1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [1.0, 0.0, 0.0],
-            [0.0, 1.0, 0.0],
-            [1.0; 3],
-            // another number, though it is equal
-            [-0.0, 0.0, 0.0],
-        ] {
-            vertices.add(point);
-        }
-        assert_eq!(vertices.corners, [0, 0, 0, 2, 1, 0, 0]);
-        assert_eq!(vertices.coordinates_m[0].len(), 5);
-        assert!(vertices.coordinates_m[0][4].is_sign_negative());
-    }
-
     /// A strip of leaf, written in micrometres.
-    fn strip(triangles: usize) -> impl ExactSizeIterator<Item = Triangle> {
+    fn strip(triangles: usize) -> impl ExactSizeIterator<Item = [DVec3; 3]> {
         let point = |k: usize| {
             let (sin, cos) = (k as f64 / 7.0).sin_cos();
-            [sin, cos, k as f64 / 100.0].map(|x| (1e6 * x).round() / 1e6)
+            (1e6 * DVec3::new(sin, cos, k as f64 / 100.0)).round() / 1e6
         };
         (0..triangles).map(move |t| [t, t + 1, t + 2].map(point))
     }
@@ -231,7 +162,7 @@ mod tests {
         let mesh = pack(strip(n));
         let bytes = mesh.x_m.len() + mesh.y_m.len() + mesh.z_m.len() + mesh.corners.len();
         assert!(bytes < 8 * n, "{bytes} bytes of {n} triangles");
-        assert_eq!(unpack(&mesh), Ok(strip(n).collect()));
+        assert_eq!(unpack::<Vec<_>>(&mesh), Ok(strip(n).collect()));
     }
 
     #[test]
@@ -269,12 +200,12 @@ mod tests {
         for (spoil, expected) in spoilt {
             let mut mesh = pack(strip(2));
             spoil(&mut mesh);
-            let fault = unpack::<[f64; 3]>(&mesh).err().unwrap().to_string();
+            let fault = unpack::<Vec<_>>(&mesh).err().unwrap().to_string();
             assert!(fault.contains(expected), "{fault}, expected {expected}");
         }
         let empty = v1::Mesh::default();
         assert!(matches!(
-            unpack::<[f64; 3]>(&empty),
+            unpack::<Vec<_>>(&empty),
             Err(MeshFault::Packing { .. })
         ));
     }
@@ -285,9 +216,9 @@ mod tests {
             points in prop::collection::vec(prop::array::uniform3(-1e9f64..1e9), 1..40),
             corners in prop::collection::vec(prop::array::uniform3(any::<prop::sample::Index>()), 0..80),
         ) {
-            let triangles: Vec<Triangle> =
-                corners.iter().map(|of| of.map(|corner| *corner.get(&points))).collect();
-            prop_assert_eq!(unpack(&pack(triangles.iter().copied())), Ok(triangles));
+            let point = |corner: prop::sample::Index| DVec3::from_array(*corner.get(&points));
+            let triangles: Vec<[DVec3; 3]> = corners.iter().map(|of| of.map(point)).collect();
+            prop_assert_eq!(unpack::<Vec<_>>(&pack(triangles.iter().copied())), Ok(triangles));
         }
 
         #[test]
@@ -301,7 +232,7 @@ mod tests {
                 let at = at.index(bytes.len());
                 bytes[at] = byte;
             }
-            if let Ok(triangles) = unpack::<[f64; 3]>(&mesh) {
+            if let Ok(triangles) = unpack::<Vec<_>>(&mesh) {
                 prop_assert_eq!(triangles.len(), 30);
             }
         }

@@ -2,14 +2,13 @@
 
 use std::collections::BTreeMap;
 
-use super::geometry::Origins;
 use super::{LoadError, name};
-use crate::formats::Place;
+use crate::canopy::{Canopy, Material};
+use crate::formats::{Origins, Place};
 use crate::formats::opt::{Opt, parse};
 use crate::formats::read::{MAX_SMALL_BYTES, read};
 use crate::inputs::BandInput;
 use crate::optics::{Band, LeafOptics};
-use crate::scene::{Material, Scene};
 
 /// All that is known of a band, before it is asked for the materials of a scene.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -102,17 +101,17 @@ impl BandOptics {
     }
 }
 
-/// The band for the materials of a scene. The albedo of soil that does not exist is 0.
+/// The band for the materials of a canopy. The albedo of soil that does not exist is 0.
 pub fn resolve_band(
     optics: BandOptics,
-    scene: &Scene,
+    canopy: &Canopy,
     origins: &Origins,
 ) -> Result<Band, LoadError> {
-    let materials = (0..).zip(&scene.materials);
+    let materials = (0..).zip(&canopy.materials);
     let materials = materials
-        .map(|(index, material)| optics.material(material, || origins.first_use(scene, index)))
+        .map(|(index, material)| optics.material(material, || origins.first_use(canopy, index)))
         .collect::<Result<_, _>>()?;
-    let soil_albedo = match scene.soil_z_m {
+    let soil_albedo = match canopy.soil_z_m {
         Some(_) => optics.material(&Material::Soil, Place::default)?.upper.rho,
         None => optics.soil_albedo().unwrap_or(0.0),
     };

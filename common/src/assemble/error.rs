@@ -4,6 +4,7 @@ use thiserror::Error;
 
 use crate::formats::{FormatError, MAX_COORDINATE, MAX_TRIANGLES, Place};
 use crate::inputs::LightFault;
+use crate::light::sky::SkyError;
 use crate::optics::OpticsFault;
 use crate::options::OptionFault;
 
@@ -19,6 +20,9 @@ pub enum LoadError {
     /// The sky cannot be.
     #[error(transparent)]
     Light(#[from] LightFault),
+    /// There is no such sky at that time and place.
+    #[error(transparent)]
+    Sky(#[from] SkyError),
     /// Optical properties that did not come from a file are not physical.
     #[error("{material} in band {band}: {fault}")]
     Optics {

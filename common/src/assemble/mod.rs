@@ -1,4 +1,4 @@
-//! From files to a checked [`Problem`]: the one door through which all input passes.
+//! From files to a checked [`Scene`]: the one door through which all input passes.
 
 mod bands;
 mod error;
@@ -8,30 +8,30 @@ mod lights;
 mod tests;
 
 use std::path::Path;
+use std::sync::Arc;
 
+use crate::canopy::Canopy;
 use crate::formats::pattern::Rectangle;
 use crate::formats::read::{MAX_GEOMETRY_BYTES, MAX_SMALL_BYTES, read};
-use crate::formats::{self, FormatError, Mesh};
+use crate::formats::{self, FormatError, GeometryFile};
 use crate::inputs::{Inputs, LightInput, PatternInput};
 use crate::inspection::{Inspection, inspect};
-use crate::light::SkyLight;
-use crate::problem::Problem;
+use crate::light::{Light, Source};
+use crate::optics::Optics;
 use crate::scene::Scene;
 
 pub use bands::{BandOptics, resolve_band};
 pub use error::LoadError;
-pub use geometry::{Geometry, Origins, build_scene};
+pub use geometry::{Geometry, build_canopy};
 pub use lights::{LightFile, merge_sources};
 
-/// A problem ready to be planned and solved.
+/// A scene ready to be planned and solved.
 #[derive(Clone, Debug)]
 pub struct Loaded {
-    /// Without sources if there is a sky.
-    pub problem: Problem,
-    /// What is in the scene and what is odd about it.
+    /// Canopy, optics and light.
+    pub scene: Scene,
+    /// What is in it and what is odd about it.
     pub inspection: Inspection,
-    /// The sky that is still to be turned into sources.
-    pub sky: Option<SkyLight>,
 }
 
 /// Reads a scene file. What it leaves out may come from the command line.
@@ -41,7 +41,7 @@ pub fn load_scene_file(path: &Path) -> Result<Inputs, LoadError> {
     Ok(formats::scene_file::parse(&name(path), &bytes, folder)?)
 }
 
-/// Reads all files of `inputs` and makes a checked problem of them.
+/// Reads all files of `inputs` and makes a checked scene of them.
 pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
     inputs.options.check()?;
     let bands = band_names(inputs)?;
@@ -63,60 +63,54 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
         .iter()
         .map(BandOptics::read)
         .collect::<Result<Vec<_>, _>>()?;
-    let (sources, sky) = match light {
-        LightInput::File(path) => (merge_sources(&[LightFile::read(path)?], bands.len()), None),
-        LightInput::Files(files) => {
-            let files = lights::per_band(files, &bands)?;
-            (merge_sources(&files, bands.len()), None)
-        }
-        LightInput::Sky {
-            sky,
-            irradiance_W_m2,
-        } => {
-            let irradiance_W_m2 = lights::values_per_band(irradiance_W_m2, &bands)?;
-            let sky = sky.clone();
-            (
-                Vec::new(),
-                Some(SkyLight {
-                    sky,
-                    irradiance_W_m2,
-                }),
-            )
-        }
-    };
-    let (scene, origins) = build_scene(read_geometry(inputs)?)?;
+    let light = self::light(light, &bands)?;
+    let (canopy, origins) = build_canopy(read_geometry(inputs)?)?;
     let bands = optics
         .into_iter()
-        .map(|optics| resolve_band(optics, &scene, &origins))
+        .map(|optics| resolve_band(optics, &canopy, &origins))
         .collect::<Result<_, _>>()?;
-    let mut inspection = inspect(&scene, &origins);
-    if sky.is_none() && sources.is_empty() {
+    let mut inspection = inspect(&canopy, &origins);
+    if light.is_dark() {
         inspection
             .warnings
             .push("no source has any light in any band".to_owned());
     }
     Ok(Loaded {
-        problem: Problem {
-            scene,
-            bands,
-            sources,
-            sky_directions: 0,
+        scene: Scene {
+            canopy: Arc::new(canopy),
+            optics: Arc::new(Optics { bands }),
+            light: Arc::new(light),
         },
         inspection,
-        sky,
+    })
+}
+
+/// The light of an input, which is the same for whoever solves: here, or a master elsewhere.
+fn light(input: &LightInput, bands: &[String]) -> Result<Light, LoadError> {
+    let of_files = |suns: Vec<Source>| Light { suns, sky: None };
+    Ok(match input {
+        LightInput::File(path) => of_files(merge_sources(&[LightFile::read(path)?], bands.len())),
+        LightInput::Files(files) => {
+            let files = lights::per_band(files, bands)?;
+            of_files(merge_sources(&files, bands.len()))
+        }
+        LightInput::Sky {
+            sky,
+            irradiance_W_m2,
+        } => sky.light(lights::values_per_band(irradiance_W_m2, bands)?)?,
     })
 }
 
 /// Looks through the geometry alone, as [`load`] would: for scenes whose optics or light are not good
 /// yet.
 pub fn inspect_geometry(inputs: &Inputs) -> Result<Inspection, LoadError> {
-    let (scene, origins) = build_scene(read_geometry(inputs)?)?;
-    Ok(inspect(&scene, &origins))
+    let (canopy, origins) = build_canopy(read_geometry(inputs)?)?;
+    Ok(inspect(&canopy, &origins))
 }
 
-/// Reads the triangles alone, in metres: where they lie is all that a drawing of results needs.
-pub fn load_scene(inputs: &Inputs) -> Result<Scene, LoadError> {
-    Ok(build_scene(read_geometry(inputs)?)?.0)
+/// Reads the canopy alone, in metres: where it stands is all that a drawing of results needs.
+pub fn load_canopy(inputs: &Inputs) -> Result<Canopy, LoadError> {
+    Ok(build_canopy(read_geometry(inputs)?)?.0)
 }
 
 fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {
@@ -124,10 +118,10 @@ fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {
         pattern: inputs.pattern.as_ref().map(read_pattern).transpose()?,
         soil: inputs.soil,
         unit: inputs.unit.unwrap_or_default(),
-        meshes: inputs
+        files: inputs
             .scenes
             .iter()
-            .map(|path| read_mesh(path))
+            .map(|path| read_geometry_file(path))
             .collect::<Result<_, _>>()?,
     })
 }
@@ -147,7 +141,7 @@ fn band_names(inputs: &Inputs) -> Result<Vec<String>, LoadError> {
     Ok(names)
 }
 
-fn read_mesh(path: &Path) -> Result<Mesh, FormatError> {
+fn read_geometry_file(path: &Path) -> Result<GeometryFile, FormatError> {
     let bytes = read(path, MAX_GEOMETRY_BYTES)?;
     let file = name(path);
     let lower = file.to_lowercase();

@@ -1,4 +1,4 @@
-//! From files to problems, and from bad files to messages.
+//! From files to scenes, and from bad files to messages.
 
 use std::fs;
 use std::path::PathBuf;
@@ -9,7 +9,7 @@ use super::*;
 use crate::inputs::BandInput;
 use crate::light::Sky;
 use crate::options::Unit;
-use crate::scene::Material;
+use crate::canopy::Material;
 
 const LEAF: &str = "p 1 100001001001 3 0 0 1 1 0 1 0 1 1\n";
 
@@ -67,9 +67,9 @@ impl Case {
 #[test]
 fn a_scene_is_moved_to_the_lower_corner_of_its_pattern() {
     let case = Case::new(LEAF).pattern([3.0, 2.0, -1.0, -2.0]).soil(-0.5);
-    let scene = case.loaded().problem.scene;
+    let scene = case.loaded().scene.canopy;
     assert_eq!(scene.origin_m.to_array(), [-1.0, -2.0, 1.0]);
-    assert_eq!(scene.triangles[0][0].to_array(), [1.0, 2.0, 0.0]);
+    assert_eq!(scene.triangle(0).corners_m[0].to_array(), [1.0, 2.0, 0.0]);
     let pattern = scene.pattern.unwrap();
     assert_eq!(pattern.min_m.to_array(), [0.0, 0.0]);
     assert_eq!(pattern.size_m.to_array(), [4.0, 4.0]);
@@ -87,11 +87,11 @@ fn fault_results_do_not_depend_on_the_unit_of_length() {
             .pattern([-0.4, -0.75, 0.4, 0.75].map(|x| x * scale))
             .soil(-0.002 * scale);
         case.inputs.unit = Some(unit);
-        case.loaded().problem.scene
+        case.loaded().scene.canopy
     };
     let metres = scene(Unit::Metre);
     for other in [scene(Unit::Centimetre), scene(Unit::Millimetre)] {
-        for (a, b) in metres.triangles[0].iter().zip(&other.triangles[0]) {
+        for (a, b) in metres.triangle(0).corners_m.iter().zip(&other.triangle(0).corners_m) {
             assert!(a.abs_diff_eq(*b, 1e-15));
         }
         let (a, b) = (metres.pattern.unwrap(), other.pattern.unwrap());
@@ -114,8 +114,9 @@ fn fault_a_scene_far_from_the_origin_is_the_same_scene() {
         .pattern([9e5, -9e5, 900_001.0, -899_999.0])
         .soil(0.0)
         .loaded();
-    assert_eq!(near.problem.scene.triangles, far.problem.scene.triangles);
-    assert_eq!(near.problem.scene.pattern, far.problem.scene.pattern);
+    let corners = |loaded: &Loaded| loaded.scene.canopy.corners_m().collect::<Vec<_>>();
+    assert_eq!(corners(&near), corners(&far));
+    assert_eq!(near.scene.canopy.pattern, far.scene.canopy.pattern);
     assert_eq!(near.inspection.area_index, far.inspection.area_index);
     assert!(far.inspection.warnings.is_empty());
 }
@@ -123,7 +124,7 @@ fn fault_a_scene_far_from_the_origin_is_the_same_scene() {
 #[test]
 fn fault_overhang_past_the_pattern_is_kept_and_reported() {
     let loaded = Case::new(LEAF).pattern([0.0, 0.0, 0.25, 2.0]).loaded();
-    assert_eq!(loaded.problem.scene.triangles.len(), 1);
+    assert_eq!(loaded.scene.canopy.len(), 1);
     assert_eq!(loaded.inspection.overhang_m, 0.75);
     assert_eq!(loaded.inspection.area_index, Some(1.0));
     assert!(loaded.inspection.warnings.is_empty());
@@ -209,14 +210,11 @@ fn materials_by_name_come_from_the_scene_file() {
     let complete = scene_file.replace("leaf =", "bark = { rho = 0.3 }\nleaf =");
     case.inputs = load_scene_file(&case.file("scene.toml", &complete)).unwrap();
     let loaded = case.loaded();
-    assert_eq!(loaded.problem.bands[0].materials[1].upper.rho, 0.3);
-    assert_eq!(loaded.problem.bands[0].soil_albedo, 0.0);
-    assert!(loaded.problem.sources.is_empty());
-    let sky = loaded.sky.unwrap();
-    assert_eq!(
-        (sky.sky, sky.irradiance_W_m2),
-        (Sky::StandardOvercast, vec![100.0])
-    );
+    assert_eq!(loaded.scene.optics.bands[0].materials[1].upper.rho, 0.3);
+    assert_eq!(loaded.scene.optics.bands[0].soil_albedo, 0.0);
+    assert!(loaded.scene.light.suns.is_empty());
+    let expected = Sky::StandardOvercast.light(vec![100.0]).unwrap();
+    assert_eq!(*loaded.scene.light, expected);
 
     case.inputs.soil = Some(0.0);
     assert_eq!(
@@ -242,7 +240,8 @@ fn light_per_band_shares_directions_and_leaves_out_the_dark() {
     let nir = case.file("nir.light", "80 0 0 -2\n0 1 0 -1\n7 0 -0.5 -1\n1 -0 0 -1\n");
     let files = [("PAR".to_owned(), par.clone()), ("NIR".to_owned(), nir)];
     case.inputs.light = Some(LightInput::Files(files.into()));
-    let sources = case.loaded().problem.sources;
+    let light = case.loaded().scene.light;
+    let sources = &light.suns;
     let irradiance: Vec<&[f64]> = sources.iter().map(|s| &s.irradiance_W_m2[..]).collect();
     assert_eq!(irradiance, [[100.0, 81.0], [30.0, 0.0], [0.0, 7.0]]);
 
@@ -255,7 +254,7 @@ fn light_per_band_shares_directions_and_leaves_out_the_dark() {
     let dark = case.file("dark.light", "0 0 0 -1\n");
     case.inputs.light = Some(LightInput::File(dark));
     let loaded = case.loaded();
-    assert!(loaded.problem.sources.is_empty());
+    assert!(loaded.scene.light.suns.is_empty());
     assert_eq!(
         loaded.inspection.warnings,
         ["no source has any light in any band"]
@@ -276,9 +275,11 @@ fn files_are_joined_by_the_names_of_organs_and_materials() {
 
     let known = second.replace("400001001001", "100001001001");
     case.file("b.can", &known);
-    let scene = case.loaded().problem.scene;
-    assert_eq!(scene.organ, [0, 1, 0, 2, 0]);
-    assert_eq!(scene.material, [0, 0, 0, 1, 0]);
+    let scene = case.loaded().scene.canopy;
+    let organ: Vec<u32> = scene.triangles().map(|t| t.organ).collect();
+    assert_eq!(organ, [0, 1, 0, 2, 0]);
+    let material: Vec<u32> = scene.triangles().map(|t| t.material).collect();
+    assert_eq!(material, [0, 0, 0, 1, 0]);
     assert_eq!(scene.materials[1], Material::Soil);
 }
 
@@ -290,7 +291,7 @@ fn odd_triangles_are_kept_and_reported() {
          p 1 100001001001 3 0 0 1 1 0 1 0 1 -1\n"
     );
     let loaded = Case::new(&text).soil(0.0).loaded();
-    assert_eq!(loaded.problem.scene.triangles.len(), 5);
+    assert_eq!(loaded.scene.canopy.len(), 5);
     let facts = loaded.inspection;
     assert_eq!(
         (facts.degenerate, facts.duplicates, facts.below_soil),

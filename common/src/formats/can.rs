@@ -10,15 +10,15 @@ use glam::DVec3;
 
 use super::error::FormatError;
 use super::lines::{Fields, Lines};
-use super::mesh::{Mesh, numbered, vertex};
-use crate::scene::{Material, Organ};
+use super::geometry_file::{GeometryFile, numbered, vertex};
+use crate::canopy::{Material, Organ};
 
 /// A polygon of more vertices is taken for a garbled count.
 pub const MAX_VERTICES: usize = 10_000;
 
 /// Parses a CAN file (unpacked); `file` is its name in messages.
-pub fn parse(file: &str, bytes: &[u8]) -> Result<Mesh, FormatError> {
-    let mut mesh = Mesh::new(file);
+pub fn parse(file: &str, bytes: &[u8]) -> Result<GeometryFile, FormatError> {
+    let mut mesh = GeometryFile::new(file);
     let mut groups = Groups::default();
     let mut polygon = Vec::new();
     let mut lines = Lines::new(file, bytes);
@@ -121,7 +121,7 @@ struct Groups {
 }
 
 impl Groups {
-    fn indices(&mut self, mesh: &mut Mesh, label: Label) -> (u32, u32) {
+    fn indices(&mut self, file: &mut GeometryFile, label: Label) -> (u32, u32) {
         if let Some((known, indices)) = self.last
             && known == label
         {
@@ -129,8 +129,8 @@ impl Groups {
         }
         let indices = *self.known.entry(label).or_insert_with(|| {
             (
-                numbered(&mut self.organs, &mut mesh.organs, label.organ()),
-                numbered(&mut self.materials, &mut mesh.materials, label.material()),
+                numbered(&mut self.organs, &mut file.organs, label.organ()),
+                numbered(&mut self.materials, &mut file.materials, label.material()),
             )
         });
         self.last = Some((label, indices));
@@ -144,8 +144,13 @@ mod tests {
 
     const LEAF: &str = "p 1 200007003001 3 0 0 1 1 0 1 0 1 1\n";
 
-    fn parsed(text: &str) -> Mesh {
+    fn parsed(text: &str) -> GeometryFile {
         parse("a.can", text.as_bytes()).unwrap()
+    }
+
+    fn corners(file: &GeometryFile) -> Vec<[DVec3; 3]> {
+        let mesh = &file.mesh;
+        (0..mesh.len()).map(|t| mesh.triangle(t).corners_m).collect()
     }
 
     fn refusal(bytes: impl AsRef<[u8]>) -> String {
@@ -189,19 +194,19 @@ mod tests {
                     p 1 100001002001 3 0 0 0 1 0 0 0 1 0\n\
                     p 1 100001001002 3 0 0 1 1 0 1 0 1 1\n";
         let mesh = parsed(text);
-        assert_eq!(mesh.organ, [0, 1, 0]);
-        assert_eq!(mesh.material, [0, 0, 0]);
+        assert_eq!(mesh.mesh.organ, [0, 1, 0]);
+        assert_eq!(mesh.mesh.material, [0, 0, 0]);
         assert_eq!(mesh.line, [3, 4, 5]);
     }
 
     #[test]
     fn polygons_are_split_and_keep_their_sides() {
         let mesh = parsed("p 1 100001001001 5 0 0 0 2 0 0 3 1 0 1 2 0 -1 1 0\n");
-        assert_eq!(mesh.triangles.len(), 3);
-        for [a, b, c] in &mesh.triangles {
+        assert_eq!(mesh.mesh.len(), 3);
+        for [a, b, c] in corners(&mesh) {
             assert!((b - a).cross(c - a).z > 0.0);
         }
-        assert_eq!((mesh.organ, mesh.line), (vec![0; 3], vec![1; 3]));
+        assert_eq!((mesh.mesh.organ, mesh.line), (vec![0; 3], vec![1; 3]));
     }
 
     #[test]
@@ -251,7 +256,7 @@ mod tests {
     #[test]
     fn fault_far_coordinates_are_taken_and_absurd_ones_refused() {
         let mesh = parsed("p 1 100001001001 3 9e5 0 1 900001 0 1 9e5 1 1\n");
-        assert_eq!(mesh.triangles[0][1].x, 900_001.0);
+        assert_eq!(corners(&mesh)[0][1].x, 900_001.0);
         let error = refusal("p 1 100001001001 3 0 0 1 1 0 -2e12 0 1 1\n");
         assert_eq!(
             error,
@@ -296,7 +301,7 @@ mod tests {
     #[test]
     fn a_file_of_nothing_is_an_empty_mesh() {
         for text in ["", "\n\n", "# nothing\n"] {
-            assert!(parsed(text).triangles.is_empty());
+            assert!(parsed(text).mesh.is_empty());
         }
     }
 }

@@ -6,17 +6,19 @@
 
 pub mod can;
 mod error;
+mod geometry_file;
 pub mod light;
 mod lines;
-mod mesh;
 #[cfg(test)]
 mod mutation_tests;
 pub mod obj;
 pub mod opt;
+mod origins;
 pub mod pattern;
 pub mod read;
 pub mod scene_file;
 
 pub use error::{FormatError, Place};
-pub(crate) use mesh::numbered;
-pub use mesh::{MAX_COORDINATE, MAX_TRIANGLES, Mesh};
+pub(crate) use geometry_file::numbered;
+pub use geometry_file::{GeometryFile, MAX_COORDINATE, MAX_TRIANGLES};
+pub use origins::Origins;

@@ -67,22 +67,20 @@ fn checked<T>(result: Result<T, FormatError>, bytes: &[u8]) -> Option<T> {
     None
 }
 
-fn sound(mesh: &Mesh) {
-    let triangles = mesh.triangles.len();
+fn sound(file: &GeometryFile) {
+    let mesh = &file.mesh;
     assert_eq!(
-        [mesh.line.len(), mesh.organ.len(), mesh.material.len()],
-        [triangles; 3]
+        [file.line.len(), mesh.organ.len(), mesh.material.len()],
+        [mesh.len(); 3]
     );
     let near = |x: f64| x.abs() <= MAX_COORDINATE;
-    for vertex in mesh.triangles.iter().flatten() {
+    for vertex in &mesh.vertices {
         assert!(vertex.to_array().into_iter().all(near));
     }
-    assert!(mesh.organ.iter().all(|&i| (i as usize) < mesh.organs.len()));
-    assert!(
-        mesh.material
-            .iter()
-            .all(|&i| (i as usize) < mesh.materials.len())
-    );
+    let below = |list: &[u32], end: usize| list.iter().all(|&i| (i as usize) < end);
+    assert!(below(mesh.triangles.as_flattened(), mesh.vertices.len()));
+    assert!(below(&mesh.organ, file.organs.len()));
+    assert!(below(&mesh.material, file.materials.len()));
 }
 
 /// One thing that may happen to a file.

@@ -7,8 +7,8 @@ use glam::DVec3;
 
 use super::error::FormatError;
 use super::lines::{Fields, Lines};
-use super::mesh::{Mesh, numbered, vertex};
-use crate::scene::{Material, Organ};
+use super::geometry_file::{GeometryFile, numbered, vertex};
+use crate::canopy::{Material, Organ};
 
 /// The name of a group, object or material where the file has none.
 pub const UNNAMED: &str = "default";
@@ -17,8 +17,8 @@ pub const UNNAMED: &str = "default";
 pub const MAX_NAME_BYTES: usize = 255;
 
 /// Parses an OBJ file (unpacked); `file` is its name in messages.
-pub fn parse(file: &str, bytes: &[u8]) -> Result<Mesh, FormatError> {
-    let mut mesh = Mesh::new(file);
+pub fn parse(file: &str, bytes: &[u8]) -> Result<GeometryFile, FormatError> {
+    let mut mesh = GeometryFile::new(file);
     let mut vertices = Vec::new();
     let mut names = Names::default();
     let mut polygon = Vec::new();
@@ -82,7 +82,7 @@ struct Names {
 }
 
 impl Names {
-    fn indices(&mut self, mesh: &mut Mesh) -> (u32, u32) {
+    fn indices(&mut self, file: &mut GeometryFile) -> (u32, u32) {
         if let Some(current) = self.current {
             return current;
         }
@@ -93,8 +93,8 @@ impl Names {
         };
         let material = Material::Named(named(&self.material));
         let current = (
-            numbered(&mut self.organs, &mut mesh.organs, organ),
-            numbered(&mut self.materials, &mut mesh.materials, material),
+            numbered(&mut self.organs, &mut file.organs, organ),
+            numbered(&mut self.materials, &mut file.materials, material),
         );
         self.current = Some(current);
         current
@@ -142,7 +142,7 @@ mod tests {
 
     const SQUARE: &str = "v 0 0 1\nv 1 0 1\nv 1 1 1 0.5 0.5 0.5\nv 0 1 1\n";
 
-    fn parsed(faces: &str) -> Result<Mesh, String> {
+    fn parsed(faces: &str) -> Result<GeometryFile, String> {
         let text = format!("{SQUARE}{faces}");
         parse("a.obj", text.as_bytes()).map_err(|error| error.to_string())
     }
@@ -150,14 +150,14 @@ mod tests {
     #[test]
     fn all_ways_to_name_a_vertex_mean_the_same() {
         let expected = parsed("f 1 2 3 4").unwrap();
-        assert_eq!(expected.triangles.len(), 2);
+        assert_eq!(expected.mesh.len(), 2);
         for face in [
             "f 1/1 2/2 3/3 4/4",
             "f 1//7 2//7 3//7 4//7",
             "f 1/1/1 2/1/1 3/1/1 4/1/1",
             "f -4 -3 -2 -1",
         ] {
-            assert_eq!(parsed(face).unwrap().triangles, expected.triangles);
+            assert_eq!(parsed(face).unwrap().mesh, expected.mesh);
         }
     }
 
@@ -182,13 +182,13 @@ mod tests {
                 ("elm", "leaf one")
             ]
         );
-        assert_eq!(mesh.organ, [0, 1, 2, 2, 3, 4]);
+        assert_eq!(mesh.mesh.organ, [0, 1, 2, 2, 3, 4]);
         let names = ["default", "bark", "leaf"];
         assert_eq!(
             mesh.materials,
             names.map(|name| Material::Named(name.into()))
         );
-        assert_eq!(mesh.material, [0, 1, 2, 2, 2, 2]);
+        assert_eq!(mesh.mesh.material, [0, 1, 2, 2, 2, 2]);
     }
 
     #[test]

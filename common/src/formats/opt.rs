@@ -6,7 +6,7 @@
 use super::error::FormatError;
 use super::lines::{Fields, Lines};
 use crate::optics::{FaceOptics, LeafOptics};
-use crate::scene::Material;
+use crate::canopy::Material;
 
 /// What an `.opt` file holds; all of it physical.
 #[derive(Clone, Debug, PartialEq)]

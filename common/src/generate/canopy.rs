@@ -4,7 +4,7 @@ use std::fmt;
 
 use glam::DVec3;
 
-use crate::scene::Pattern;
+use crate::canopy::Pattern;
 
 /// Soil plane of all generated canopies, metres: a little below the lowest vertex, so that nothing
 /// lies in the plane itself.

@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::canopy::Generated;
 use crate::light::sky::SkyError;
-use crate::light::{Sky, SkyLight};
+use crate::light::Sky;
 
 /// Typical of green leaves; upper and lower faces differ, as they do in nature.
 const PAR_OPT: &str = "\
@@ -102,17 +102,15 @@ impl Generated {
 
 /// A summer morning at 45 degrees north: 500 W m⁻², a fifth of it from the sky.
 fn clear_light() -> Result<String, SkyError> {
-    let light = SkyLight {
-        sky: Sky::Clear {
-            time_utc: "2024-06-21T10:00:00Z".to_owned(),
-            latitude_deg: 45.0,
-            longitude_deg: 0.0,
-            diffuse_fraction: 0.2,
-        },
-        irradiance_W_m2: vec![500.0],
+    let sky = Sky::Clear {
+        time_utc: "2024-06-21T10:00:00Z".to_owned(),
+        latitude_deg: 45.0,
+        longitude_deg: 0.0,
+        diffuse_fraction: 0.2,
     };
+    let light = sky.light(vec![500.0])?;
     let mut text = String::new();
-    for source in light.sources(SKY_DIRECTIONS, 0)? {
+    for source in light.sources(SKY_DIRECTIONS, 0).list {
         let [x, y, z] = source.direction.to_array();
         let irradiance: f64 = source.irradiance_W_m2.iter().sum();
         text.push_str(&format!("{irradiance} {x} {y} {z}\n"));

@@ -8,7 +8,7 @@ use super::angles::LeafAngles;
 use super::canopy::{Generated, Label};
 use super::dice::Dice;
 use super::{GenerateError, check};
-use crate::scene::Pattern;
+use crate::canopy::Pattern;
 
 /// The outline of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use glam::DVec2;
 
 use super::canopy::Label;
 use super::{GenerateError, check};
-use crate::scene::Pattern;
+use crate::canopy::Pattern;
 
 /// Rows of plants; the pattern is the ground they take, centred on the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]

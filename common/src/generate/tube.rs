@@ -56,7 +56,7 @@ mod tests {
     use glam::DVec2;
 
     use super::*;
-    use crate::scene::Pattern;
+    use crate::canopy::Pattern;
 
     #[test]
     fn a_tube_is_closed_but_at_its_base_and_faces_outwards() {

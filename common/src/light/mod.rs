@@ -1,12 +1,25 @@
-//! Light that falls on the canopy: a list of parallel sources.
+//! Light that falls on the canopy: parallel sources, and a sky.
 
 pub mod sky;
 mod spec;
 pub mod sun;
 
+use std::num::NonZeroUsize;
+
 use glam::DVec3;
 
-pub use spec::{Sky, SkyLight};
+pub use sky::SkyLight;
+pub use spec::Sky;
+
+/// All light above a canopy.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Light {
+    /// Parallel sources that are meant as they are, each with one irradiance per band: the sun, or what a file
+    /// lists.
+    pub suns: Vec<Source>,
+    /// A sky, which is computed as many directions as an accuracy asks for.
+    pub sky: Option<SkyLight>,
+}
 
 /// A parallel source: the sun, or one direction of a sky.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,4 +28,36 @@ pub struct Source {
     pub direction: DVec3,
     /// Irradiance of a horizontal plane above the canopy, per band, W m⁻², each finite and `>= 0`.
     pub irradiance_W_m2: Vec<f64>,
+}
+
+/// The parallel sources that a light is computed as.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sources {
+    /// Those of the sky, then the others.
+    pub list: Vec<Source>,
+    /// How many of them, from the first on, are directions that stand for a sky: another choice of directions
+    /// would give another result.
+    pub sky_directions: usize,
+}
+
+impl Light {
+    /// Its parallel sources, with so many directions for a sky, if there is one; see [`SkyLight::sources`] for
+    /// the seed.
+    pub fn sources(&self, directions: NonZeroUsize, seed: u64) -> Sources {
+        let sky = self.sky.as_ref();
+        let mut list = sky.map_or_else(Vec::new, |sky| sky.sources(directions, seed));
+        let sky_directions = list.len();
+        list.extend_from_slice(&self.suns);
+        Sources {
+            list,
+            sky_directions,
+        }
+    }
+
+    /// No light in any band.
+    pub fn is_dark(&self) -> bool {
+        let suns = self.suns.iter().flat_map(|sun| &sun.irradiance_W_m2);
+        let sky = self.sky.iter().flat_map(|sky| &sky.irradiance_W_m2);
+        suns.chain(sky).all(|&irradiance| irradiance == 0.0)
+    }
 }

@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 use thiserror::Error;
 
 use super::sun::{Sun, SunError};
-use super::{Sky, SkyLight, Source};
+use super::{Light, Sky, Source};
 
 /// Turn from one direction of the spiral to the next, radians: a full turn over the square of the
 /// golden ratio.
@@ -38,44 +38,65 @@ pub fn directions_for(accuracy_percent: f64) -> NonZeroUsize {
     NonZeroUsize::MIN.saturating_add(wanted.clamp(16, 4000) - 1)
 }
 
+/// The light of a sky without its sun.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SkyLight {
+    /// How it is distributed.
+    pub radiance: Radiance,
+    /// Per band, total of sky and sun on a horizontal plane above the canopy, W m⁻², each finite and `>= 0`.
+    pub irradiance_W_m2: Vec<f64>,
+    /// The part of that which comes from the sky, above 0 to 1.
+    pub diffuse_fraction: f64,
+}
+
 impl SkyLight {
-    /// The sky as `directions` sources, followed by the sun if there is one.
+    /// The sky as `directions` sources.
     ///
     /// In every band the irradiances add up to what was asked for, to rounding. The same `seed` gives
     /// the same list; different seeds give independent realisations (turned in azimuth, and each
     /// direction elsewhere in its band), so that their scatter shows what the number of directions
-    /// does to a result. A clear sky without a direct part has no sun in the list, one without a
-    /// diffuse part has only the sun.
-    pub fn sources(&self, directions: NonZeroUsize, seed: u64) -> Result<Vec<Source>, SkyError> {
-        if let Some(&value) = self
-            .irradiance_W_m2
-            .iter()
-            .find(|e| !(e.is_finite() && **e >= 0.0))
-        {
-            return Err(SkyError::Irradiance { value });
-        }
-        let scaled = |part: f64| self.irradiance_W_m2.iter().map(|e| part * e).collect();
-        let (radiance, diffuse, sun) = self.sky.resolve()?;
-        let mut sources = Vec::new();
-        if diffuse > 0.0 {
-            let parts = parts_of_sky(radiance, directions, seed);
-            let whole: f64 = parts.iter().map(|p| p.irradiance).sum();
-            sources.extend(parts.iter().map(|p| Source {
+    /// does to a result.
+    pub fn sources(&self, directions: NonZeroUsize, seed: u64) -> Vec<Source> {
+        let parts = parts_of_sky(self.radiance, directions, seed);
+        let whole: f64 = parts.iter().map(|p| p.irradiance).sum();
+        let source = |p: &SkyPart| {
+            let part = self.diffuse_fraction * p.irradiance / whole;
+            Source {
                 direction: -p.towards,
-                irradiance_W_m2: scaled(diffuse * p.irradiance / whole),
-            }));
-        }
-        if let Some(sun) = sun {
-            sources.push(Source {
-                direction: -sun.towards(),
-                irradiance_W_m2: scaled(1.0 - diffuse),
-            });
-        }
-        Ok(sources)
+                irradiance_W_m2: self.irradiance_W_m2.iter().map(|e| part * e).collect(),
+            }
+        };
+        parts.iter().map(source).collect()
     }
 }
 
 impl Sky {
+    /// The light of this sky and its sun, with so much on a horizontal plane above the canopy, W m⁻², per band.
+    ///
+    /// A clear sky without a direct part has no sun, one without a diffuse part has only the sun.
+    pub fn light(&self, irradiance_W_m2: Vec<f64>) -> Result<Light, SkyError> {
+        let improper = |e: &&f64| !(e.is_finite() && **e >= 0.0);
+        if let Some(&value) = irradiance_W_m2.iter().find(improper) {
+            return Err(SkyError::Irradiance { value });
+        }
+        let (radiance, diffuse_fraction, sun) = self.resolve()?;
+        let of_sun = |sun: Sun| Source {
+            direction: -sun.towards(),
+            irradiance_W_m2: irradiance_W_m2
+                .iter()
+                .map(|e| (1.0 - diffuse_fraction) * e)
+                .collect(),
+        };
+        Ok(Light {
+            suns: sun.map(of_sun).into_iter().collect(),
+            sky: (diffuse_fraction > 0.0).then_some(SkyLight {
+                radiance,
+                irradiance_W_m2,
+                diffuse_fraction,
+            }),
+        })
+    }
+
     /// How the sky's radiance is distributed, the diffuse part of all irradiance, and the sun if it
     /// brings any.
     fn resolve(&self) -> Result<(Radiance, f64, Option<Sun>), SkyError> {
@@ -102,14 +123,16 @@ impl Sky {
 }
 
 /// Radiance over the sky, in units of that of the zenith.
-#[derive(Clone, Copy, Debug)]
-enum Radiance {
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Radiance {
+    /// The same from everywhere.
     Uniform,
     /// Moon & Spencer 1942; also type 16 of the CIE standard (ISO 15469:2004).
     MoonSpencer,
     /// Type 12 of the CIE standard general sky (CIE S 011/E:2003, ISO 15469:2004): "CIE standard
     /// clear sky, low illuminance turbidity".
     CieClear {
+        /// Unit vector towards the sun, z > 0.
         towards_sun: DVec3,
     },
 }

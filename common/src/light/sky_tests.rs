@@ -15,13 +15,8 @@ fn clear(diffuse_fraction: f64) -> Sky {
 }
 
 fn sources(sky: Sky, directions: usize, seed: u64) -> Vec<Source> {
-    let irradiance_W_m2 = vec![100.0];
-    SkyLight {
-        sky,
-        irradiance_W_m2,
-    }
-    .sources(count(directions), seed)
-    .unwrap()
+    let light = sky.light(vec![100.0]).unwrap();
+    light.sources(count(directions), seed).list
 }
 
 #[test]
@@ -130,12 +125,8 @@ fn bad_light_is_refused() {
         ));
     }
     for value in [-1.0, f64::INFINITY, f64::NAN] {
-        let light = SkyLight {
-            sky: Sky::UniformOvercast,
-            irradiance_W_m2: vec![1.0, value],
-        };
         assert!(matches!(
-            light.sources(count(3), 0),
+            Sky::UniformOvercast.light(vec![1.0, value]),
             Err(SkyError::Irradiance { .. })
         ));
     }
@@ -155,8 +146,8 @@ proptest! {
             1 => Sky::StandardOvercast,
             _ => clear(diffuse),
         };
-        let light = SkyLight { sky, irradiance_W_m2: irradiance.clone() };
-        let list = light.sources(count(directions), seed).unwrap();
+        let light = sky.light(irradiance.clone()).unwrap();
+        let list = light.sources(count(directions), seed).list;
         for (band, wanted) in irradiance.iter().enumerate() {
             let sum: f64 = list.iter().map(|s| s.irradiance_W_m2[band]).sum();
             prop_assert!((sum - wanted).abs() <= 1e-13 * wanted);

@@ -1,4 +1,4 @@
-//! What a user says of a sky, before it is turned into parallel sources.
+//! What a user says of a sky, before it is known where its sun stands.
 
 /// The distribution of radiance over the sky.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,13 +18,4 @@ pub enum Sky {
         /// Part of the irradiance that comes from the sky and not straight from the sun, 0 to 1.
         diffuse_fraction: f64,
     },
-}
-
-/// A sky and how much light it brings.
-#[derive(Clone, Debug, PartialEq)]
-pub struct SkyLight {
-    /// The distribution.
-    pub sky: Sky,
-    /// Per band, total on a horizontal plane above the canopy, W m⁻², each finite and `>= 0`.
-    pub irradiance_W_m2: Vec<f64>,
 }

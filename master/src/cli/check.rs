@@ -2,13 +2,12 @@
 
 use anyhow::Result;
 use clap::Args;
-use nestrad_common::assemble::{self, Loaded};
-use nestrad_common::inputs::Inputs;
+use nestrad_common::assemble;
 use nestrad_common::inspection::Inspection;
+use nestrad_common::light::{Light, SkyLight};
 use nestrad_common::optics::FaceOptics;
 use nestrad_common::options::Options;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Aims, Settings};
+use nestrad_common::scene::Scene;
 
 use super::console;
 use super::flags::SceneFlags;
@@ -25,12 +24,12 @@ pub(crate) struct CheckArgs {
 impl CheckArgs {
     pub(crate) fn run(self) -> Result<()> {
         let inputs = self.scene.inputs(Options::default())?;
-        match load(&inputs) {
+        match assemble::load(&inputs) {
             Ok(loaded) => {
                 let mut facts = Facts::default();
                 facts.geometry(&loaded.inspection);
-                facts.optics(&loaded.problem);
-                facts.light(&loaded.problem);
+                facts.optics(&loaded.scene);
+                facts.light(&loaded.scene);
                 facts.warnings(&loaded.inspection);
                 console::print(facts.0.as_bytes())
             }
@@ -42,24 +41,10 @@ impl CheckArgs {
                     facts.warnings(&inspection);
                     console::print(facts.0.as_bytes())?;
                 }
-                Err(error)
+                Err(error.into())
             }
         }
     }
-}
-
-/// As `solve` does it.
-fn load(inputs: &Inputs) -> Result<Loaded> {
-    let mut loaded = assemble::load(inputs)?;
-    if let Some(sky) = &loaded.sky {
-        let default = Settings::default();
-        let accuracy = inputs.options.accuracy_percent;
-        let accuracy_percent = accuracy.unwrap_or(default.accuracy_percent);
-        let directions = Aims::of(accuracy_percent).sky_directions();
-        let seed = inputs.options.seed.unwrap_or(default.seed);
-        loaded.problem.light_by(sky, directions, seed)?;
-    }
-    Ok(loaded)
 }
 
 /// Lines of text: a word, and what is to be said of it.
@@ -120,14 +105,14 @@ impl Facts {
         }
     }
 
-    fn optics(&mut self, problem: &Problem) {
-        for band in &problem.bands {
+    fn optics(&mut self, scene: &Scene) {
+        for band in &scene.optics.bands {
             let face = |f: FaceOptics| format!("rho {} tau {}", f.rho, f.tau);
             let mut parts = Vec::new();
-            if problem.scene.soil_z_m.is_some() {
+            if scene.canopy.soil_z_m.is_some() {
                 parts.push(format!("soil rho {}", band.soil_albedo));
             }
-            for (material, optics) in problem.scene.materials.iter().zip(&band.materials) {
+            for (material, optics) in scene.canopy.materials.iter().zip(&band.materials) {
                 let (upper, lower) = (face(optics.upper), face(optics.lower));
                 parts.push(if upper == lower {
                     format!("{material} {upper}")
@@ -139,14 +124,23 @@ impl Facts {
         }
     }
 
-    fn light(&mut self, problem: &Problem) {
-        let sources = &problem.sources;
-        let sum = |band: usize| sources.iter().map(|s| s.irradiance_W_m2[band]).sum::<f64>();
-        let totals = (0..).zip(&problem.bands);
+    fn light(&mut self, scene: &Scene) {
+        let Light { suns, sky } = &*scene.light;
+        let sum = |band: usize| {
+            let of_sky = |sky: &SkyLight| sky.diffuse_fraction * sky.irradiance_W_m2[band];
+            let of_suns: f64 = suns.iter().map(|s| s.irradiance_W_m2[band]).sum();
+            of_suns + sky.as_ref().map_or(0.0, of_sky)
+        };
+        let totals = (0..).zip(&scene.optics.bands);
         let totals = totals.map(|(b, band)| format!("{} {:.2} W m⁻²", band.name, sum(b)));
         let totals = totals.collect::<Vec<_>>().join(", ");
-        let s = if sources.len() == 1 { "" } else { "s" };
-        self.line("light", &format!("{} source{s}: {totals}", sources.len()));
+        let s = if suns.len() == 1 { "" } else { "s" };
+        let what = match (suns.len(), sky) {
+            (0, Some(_)) => "a sky".to_owned(),
+            (n, Some(_)) => format!("a sky and {n} source{s}"),
+            (n, None) => format!("{n} source{s}"),
+        };
+        self.line("light", &format!("{what}: {totals}"));
     }
 
     fn warnings(&mut self, facts: &Inspection) {

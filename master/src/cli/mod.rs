@@ -1,5 +1,6 @@
 //! The command line: one module a command, and what they share.
 
+mod bar;
 mod check;
 mod console;
 mod flags;

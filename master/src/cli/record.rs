@@ -3,12 +3,12 @@
 use nestrad_common::inputs::{Inputs, LightInput, PatternInput};
 use nestrad_common::light::Sky;
 use nestrad_common::options::{Diameter, TableFormat, Unit};
-use nestrad_master::plan::{Estimator, Settings};
+use nestrad_engine::plan::{Estimator, Settings};
 use serde::Serialize;
 
 /// What was asked for. Files are as the user named them.
 #[derive(Debug, Serialize)]
-pub(crate) struct Record {
+pub(crate) struct OptionsRecord {
     scenes: Vec<String>,
     unit: Unit,
     pattern: Option<String>,
@@ -36,7 +36,7 @@ struct BandRecord {
     optics: Option<String>,
 }
 
-impl Record {
+impl OptionsRecord {
     /// To be called where the work is done, if not at a master: it counts the threads there.
     pub(crate) fn new(
         inputs: &Inputs,

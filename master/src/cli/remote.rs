@@ -4,13 +4,14 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use nestrad_common::problem::Problem;
-use nestrad_master::output::progress::{Progress, StageProgress};
-use nestrad_master::plan::Settings;
-use nestrad_master::remote::{self, Event, Remote};
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::Settings;
+use nestrad_engine::progress::{Progress, StageProgress};
 use nestrad_proto::channel::{self, Credentials};
+use nestrad_service::client::{self, Event, SolvedThere};
 use tokio::signal::unix::{SignalKind, signal};
 
+use super::bar::Bar;
 use super::console::Notes;
 
 /// Where to compute.
@@ -32,10 +33,10 @@ impl MasterFlags {
     pub(crate) fn solve(
         &self,
         url: &str,
-        problem: Arc<Problem>,
+        scene: Scene,
         settings: &Settings,
         notes: Notes,
-    ) -> Result<Remote> {
+    ) -> Result<SolvedThere> {
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(1)
             .enable_all()
@@ -50,8 +51,9 @@ impl MasterFlags {
                     _ = interrupt.recv() => {}
                 }
             };
-            let master = remote::client(channel::connect(url, &self.credentials)?);
-            let progress = Progress::new(notes.quiet);
+            let master = client::client(channel::connect(url, &self.credentials)?);
+            let progress = Arc::new(Progress::default());
+            let _bar = Bar::of(&progress, notes.quiet);
             let mut last = StageProgress::default();
             let tell = |event| match event {
                 Event::Plan(line) => notes.say("plan", &line),
@@ -65,7 +67,7 @@ impl MasterFlags {
                     last = now;
                 }
             };
-            let solved = remote::solve(master, problem, settings, tell, stop).await;
+            let solved = client::solve(master, scene, settings, tell, stop).await;
             solved.with_context(|| format!("master {url}"))
         })
     }

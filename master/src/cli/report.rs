@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use nestrad_common::assemble;
 use nestrad_common::inputs::Inputs;
-use nestrad_master::report::{self, PictureRequest, Request};
+use nestrad_results::report::{self, PictureRequest, Request};
 
 use super::console::Notes;
 

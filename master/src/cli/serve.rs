@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use nestrad_master::cluster;
-use nestrad_master::service::{Limits, Service, serve_metrics};
+use nestrad_cluster::WorkerLimits;
 use nestrad_proto::access::Access;
+use nestrad_service::server::{Service, ServiceLimits, serve_metrics};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
@@ -82,9 +82,9 @@ struct LimitFlags {
 }
 
 impl LimitFlags {
-    fn limits(self) -> Limits {
+    fn limits(self) -> ServiceLimits {
         let bytes = |GiB: f64| (GiB * (1u64 << 30) as f64) as u64;
-        Limits {
+        ServiceLimits {
             scene_bytes: bytes(self.scene_memory),
             result_bytes: bytes(self.result_memory),
             solve_GiB: self.memory,
@@ -132,9 +132,9 @@ impl ServeArgs {
                 _ = interrupt.recv() => {}
             }
         };
-        let workers = cluster::Limits {
+        let workers = WorkerLimits {
             patience: self.patience,
-            ..cluster::Limits::default().with_lease(self.lease)
+            ..WorkerLimits::default().with_lease(self.lease)
         };
         let kept = self.state.open()?;
         let threads = self.limits.threads.into();

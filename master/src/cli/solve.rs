@@ -6,28 +6,29 @@ use std::sync::Arc;
 use anyhow::{Context, Result};
 use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
+use nestrad_cluster::with_rows;
 use nestrad_common::assemble::{self, Loaded};
 use nestrad_common::inputs::Inputs;
 use nestrad_common::inspection::Inspection;
-use nestrad_common::light::SkyLight;
-use nestrad_common::options::{self, Diameter, Options};
-use nestrad_common::problem::Problem;
-use nestrad_master::exchange::{JobCounts, Traced};
-use nestrad_master::output::progress::Progress;
-use nestrad_master::output::resources::{Stage, Stopwatch, Usage};
-use nestrad_master::output::summary::Summary;
-use nestrad_master::output::{self, Formats, TableFormat, terminal};
-use nestrad_master::plan::{Aims, Estimator, Plan, Settings};
-use nestrad_master::remote::Remote;
-use nestrad_master::rounds::{Accuracy, Round, solve_in_rounds};
-use nestrad_master::run::{Counters, Means};
-use nestrad_master::solution::Solution;
+use nestrad_common::options::{Diameter, Options, TableFormat};
+use nestrad_common::scene::Scene;
+use nestrad_engine::account::organ_spread;
+use nestrad_engine::plan::{Estimator, Plan, Settings};
+use nestrad_engine::progress::Progress;
+use nestrad_engine::rounds::{Accuracy, Round, solve_in_rounds};
+use nestrad_engine::run::Run;
+use nestrad_engine::stop::Stop;
+use nestrad_engine::stopwatch::{Stage, Stopwatch, Usage};
+use nestrad_results::summary::Summary;
+use nestrad_results::{Formats, check_writable, stage, terminal};
+use nestrad_service::client::SolvedThere;
 use rayon::ThreadPoolBuilder;
 use serde::Deserialize;
 
+use super::bar::Bar;
 use super::console::{self, Notes};
 use super::flags::{SceneFlags, positive};
-use super::record::Record;
+use super::record::OptionsRecord;
 use super::remote::MasterFlags;
 use super::state::StateFlags;
 use super::workers::{Crew, WorkersFlags};
@@ -109,7 +110,7 @@ struct ResultFlags {
 
     /// Form of the result tables: csv or parquet [default: csv]
     #[arg(long, value_name = "FORM")]
-    format: Option<options::TableFormat>,
+    format: Option<TableFormat>,
 
     /// Write canopy.vtp too: the triangles with their light, for ParaView
     #[arg(long)]
@@ -190,70 +191,55 @@ struct Task {
     notes: Notes,
 }
 
-/// What came of it, here or at a master.
-struct Computed {
-    solution: Solution,
-    plan: serde_json::Value,
-    counters: Counters,
-    stages: Vec<Stage>,
-    usage: Usage,
-    /// Sources that the scene was lit by.
-    sources: usize,
-}
-
 impl Task {
     fn solve(&self) -> Result<()> {
         let mut watch = Stopwatch::start();
-        let loaded = self.load()?;
+        let Loaded { scene, inspection } = self.load()?;
         // before the work, not after it
-        output::check_writable(&self.out)?;
+        check_writable(&self.out)?;
         watch.lap("input");
-
-        let (problem, sky) = (Arc::new(loaded.problem), loaded.sky);
-        let computed = match &self.place.master {
-            None => self.compute(&problem, sky.as_ref(), &mut watch)?,
+        let solved = match &self.place.master {
+            None => self.compute(&scene, &mut watch)?,
             Some(url) => {
-                let remote = self
-                    .place
-                    .solve(url, problem.clone(), &self.settings, self.notes)?;
+                let solved =
+                    self.place
+                        .solve(url, scene.clone(), &self.settings, self.notes)?;
                 watch.lap("at the master");
-                elsewhere(remote, problem.sources.len())?
+                solved
             }
         };
-        self.write(&problem, &loaded.inspection, computed, watch)
+        self.write(&scene, &inspection, solved, watch)
     }
 
-    fn compute(
-        &self,
-        problem: &Problem,
-        sky: Option<&SkyLight>,
-        watch: &mut Stopwatch,
-    ) -> Result<Computed> {
+    /// The same as a master gives back, computed here: what it took is in `watch`.
+    fn compute(&self, scene: &Scene, watch: &mut Stopwatch) -> Result<SolvedThere> {
         let begins = |plan: &Plan, before: &[Round]| self.begins(plan, before);
-        let progress = Progress::new(self.notes.quiet);
+        let progress = Arc::new(Progress::default());
+        let bar = Bar::of(&progress, self.notes.quiet);
+        let run = Run {
+            stop: &Stop::default(),
+            progress: &progress,
+        };
         let kept = self.state.open()?;
         let crew = self.workers.crew(self.settings.memory_GiB, self.notes)?;
-        let means = Means {
-            workers: crew.as_ref().map(Crew::cluster),
-            kept: kept.as_ref(),
-        };
-        let settings = &self.settings;
-        let reached = solve_in_rounds(problem, sky, settings, means, &progress, watch, begins)?;
-        drop(crew);
+        let workers = crew.as_ref().map(Crew::cluster);
+        let solved = with_rows(workers, kept.as_ref(), |rows| {
+            solve_in_rounds(scene, &self.settings, rows, &run, watch, begins)
+        })?;
+        drop((crew, bar));
         if let Some(kept) = kept {
             kept.close();
             if let Some(warning) = kept.warning() {
                 self.notes.say("warning", &warning);
             }
         }
-        Ok(Computed {
-            plan: serde_json::to_value(reached.record())
+        Ok(SolvedThere {
+            plan: serde_json::to_value(solved.plan_record())
                 .context("the plan cannot be written down")?,
-            solution: reached.finished.solution,
-            counters: reached.finished.counters,
+            solution: solved.solution,
+            work: solved.work,
             stages: Vec::new(),
             usage: Usage::default(),
-            sources: reached.sources,
         })
     }
 
@@ -270,57 +256,57 @@ impl Task {
         }
     }
 
-    /// The problem, with a sky turned into sources.
     fn load(&self) -> Result<Loaded> {
-        let mut loaded = assemble::load(&self.inputs)?;
+        let loaded = assemble::load(&self.inputs)?;
         for warning in &loaded.inspection.warnings {
             self.notes.say("warning", warning);
-        }
-        if let Some(sky) = &loaded.sky {
-            let directions = Aims::of(self.settings.accuracy_percent).sky_directions();
-            loaded
-                .problem
-                .light_by(sky, directions, self.settings.seed)?;
         }
         Ok(loaded)
     }
 
     fn write(
         &self,
-        problem: &Problem,
+        scene: &Scene,
         inspection: &Inspection,
-        computed: Computed,
+        solved: SolvedThere,
         mut watch: Stopwatch,
     ) -> Result<()> {
-        let Problem { scene, bands, .. } = problem;
-        let names: Vec<&str> = bands.iter().map(|band| band.name.as_str()).collect();
-        let solution = &computed.solution;
-        let staged = output::stage(&self.out, scene, &names, solution, self.formats())?;
+        let canopy = &scene.canopy;
+        let names = scene.optics.names();
+        let solution = &solved.solution;
+        let staged = stage(&self.out, canopy, &names, solution, self.formats())?;
         watch.lap("output");
         let here = watch.usage();
         let usage = Usage {
             wall_s: here.wall_s,
-            cpu_s: here.cpu_s + computed.usage.cpu_s,
-            peak_memory_bytes: here.peak_memory_bytes.max(computed.usage.peak_memory_bytes),
+            cpu_s: here.cpu_s + solved.usage.cpu_s,
+            peak_memory_bytes: here.peak_memory_bytes.max(solved.usage.peak_memory_bytes),
         };
         let master = self.place.master.as_deref();
+        let sources = solved.work.sources;
+        // the stages of a master come before those of this process
+        let elsewhere = solved.stages.into_iter().map(|stage| Stage {
+            name: format!("master: {}", stage.name),
+            ..stage
+        });
+        let stages: Vec<Stage> = elsewhere.chain(watch.stages().iter().cloned()).collect();
         staged.commit(&Summary {
             version: env!("CARGO_PKG_VERSION"),
-            options: &Record::new(&self.inputs, &self.settings, computed.sources, master),
+            options: &OptionsRecord::new(&self.inputs, &self.settings, sources, master),
             scene: inspection,
-            plan: &computed.plan,
+            plan: &solved.plan,
             energy_balance: &solution.balance,
-            error_estimates: &nestrad_master::errors::organ_errors(scene, solution),
-            counters: &computed.counters,
-            stages: &[&computed.stages, watch.stages()].concat(),
+            error_estimates: &organ_spread(&canopy.plants(), solution),
+            counters: &solved.work,
+            stages: &stages,
             resources: usage,
         })?;
         if self.notes.quiet {
             return Ok(());
         }
-        self.say_accuracy(&computed.plan);
+        self.say_accuracy(&solved.plan);
         let mut table = Vec::new();
-        terminal::write(&mut table, scene, solution, usage)?;
+        terminal::write(&mut table, canopy, solution, usage)?;
         console::print(&table)?;
         let place = self.out.display();
         self.notes.say("done", &format!("results are in {place}"));
@@ -338,49 +324,8 @@ impl Task {
     fn formats(&self) -> Formats {
         let options = &self.inputs.options;
         Formats {
-            table: match options.format.unwrap_or_default() {
-                options::TableFormat::Csv => TableFormat::Csv,
-                options::TableFormat::Parquet => TableFormat::Parquet,
-            },
+            table: options.format.unwrap_or_default(),
             vtp: options.vtp.unwrap_or(false),
         }
     }
-}
-
-/// What a master computed. Its stages come before those of this process.
-fn elsewhere(remote: Remote, sources: usize) -> Result<Computed> {
-    let Remote { solution, summary } = remote;
-    let plan: serde_json::Value =
-        serde_json::from_str(&summary.plan_json).context("the master's plan cannot be read")?;
-    let stages = summary.stages.into_iter().map(|stage| Stage {
-        name: format!("master: {}", stage.name),
-        wall_s: stage.wall_s,
-        cpu_s: stage.cpu_s,
-    });
-    Ok(Computed {
-        solution,
-        plan,
-        counters: Counters {
-            elements: summary.elements as usize,
-            direct_lines: summary.direct_lines,
-            exchange: Traced {
-                lines: summary.lines,
-                segments: summary.segments,
-                rays: summary.rays,
-                row_entries: summary.row_entries,
-            },
-            jobs: JobCounts {
-                traced: summary.jobs_traced,
-                kept: summary.jobs_kept,
-            },
-            passes: summary.passes,
-        },
-        stages: stages.collect(),
-        usage: Usage {
-            wall_s: summary.wall_s,
-            cpu_s: summary.cpu_s,
-            peak_memory_bytes: Some(summary.peak_memory_bytes).filter(|&bytes| bytes > 0),
-        },
-        sources,
-    })
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use nestrad_master::store::Store;
+use nestrad_cluster::store::Store;
 
 use super::flags::positive;
 

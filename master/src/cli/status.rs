@@ -5,9 +5,9 @@ use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
 use clap::Args;
-use nestrad_master::remote;
 use nestrad_proto::channel::{self, Credentials};
 use nestrad_proto::v1;
+use nestrad_service::client;
 use tokio::time::timeout;
 
 use super::console;
@@ -37,7 +37,7 @@ impl StatusArgs {
             .context("cannot start threads")?;
         let status = runtime.block_on(async {
             let channel = channel::connect(&self.master, &self.credentials)?;
-            let mut master = remote::client(channel);
+            let mut master = client::client(channel);
             let answer = timeout(ANSWER, master.status(v1::StatusRequest {})).await;
             let answer = answer.unwrap_or_else(|_| Err(tonic::Status::unavailable("no answer")));
             answer.map_err(|status| anyhow!("{}: {}", self.master, status.message()))

@@ -1,6 +1,7 @@
 //! `nestrad trade`: what speed costs in accuracy, on the user's own scene.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::Args;
@@ -8,15 +9,19 @@ use clap::builder::RangedU64ValueParser;
 use nestrad_common::assemble;
 use nestrad_common::inputs::Inputs;
 use nestrad_common::options::Options;
-use nestrad_master::output::{check_writable, progress::Progress};
-use nestrad_master::plan::{Aims, Settings};
-use nestrad_master::trade::request::Request;
-use nestrad_master::trade::setting::grid;
-use nestrad_master::trade::study::run;
-use nestrad_master::trade::table::Comparison;
-use nestrad_master::trade::{About, write};
+use nestrad_engine::plan::Settings;
+use nestrad_engine::progress::Progress;
+use nestrad_engine::run::Run;
+use nestrad_engine::stop::Stop;
+use nestrad_results::check_writable;
+use nestrad_results::trade::request::Request;
+use nestrad_results::trade::setting::grid;
+use nestrad_results::trade::study::carry_out;
+use nestrad_results::trade::table::Comparison;
+use nestrad_results::trade::{About, write};
 use rayon::ThreadPoolBuilder;
 
+use super::bar::Bar;
 use super::console::{self, Notes};
 use super::flags::{SceneFlags, positive};
 
@@ -96,15 +101,10 @@ impl HowFlags {
         for warning in &loaded.inspection.warnings {
             notes.say("warning", warning);
         }
-        let mut problem = loaded.problem;
-        if let Some(sky) = &loaded.sky {
-            problem.light_by(sky, Aims::of(self.finest).sky_directions(), seed)?;
-        }
         check_writable(&self.out)?;
-        let settings = grid(&problem, self.finest);
+        let settings = grid(&loaded.scene.canopy, self.finest);
         let request = Request {
-            problem: &problem,
-            sky: loaded.sky.as_ref(),
+            scene: &loaded.scene,
             out: &self.out,
             settings: &settings,
             finest_percent: self.finest,
@@ -112,8 +112,13 @@ impl HowFlags {
             runs: self.seeds,
             seed,
         };
-        let progress = Progress::new(self.quiet);
-        let study = run(&request, &progress, |line| notes.say("trade", line))?;
+        let progress = Arc::new(Progress::default());
+        let _bar = Bar::of(&progress, self.quiet);
+        let run = Run {
+            stop: &Stop::default(),
+            progress: &progress,
+        };
+        let study = carry_out(&request, &run, |line| notes.say("trade", line))?;
         let comparison = Comparison::of(&request, &study);
         let scenes: Vec<String> = inputs
             .scenes

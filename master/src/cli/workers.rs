@@ -6,9 +6,9 @@ use std::time::Duration;
 use anyhow::Result;
 use clap::Args;
 use clap::builder::RangedU64ValueParser;
-use nestrad_master::cluster::door::Door;
-use nestrad_master::cluster::local::{LocalWorkers, Share};
-use nestrad_master::cluster::{Cluster, Limits};
+use nestrad_cluster::door::Door;
+use nestrad_cluster::local::{LocalWorkers, Share};
+use nestrad_cluster::{Cluster, WorkerLimits};
 use nestrad_proto::access::Access;
 
 use super::console::Notes;
@@ -59,9 +59,9 @@ impl WorkersFlags {
         }
         let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
         let threads = rayon::current_num_threads();
-        let limits = Limits {
+        let limits = WorkerLimits {
             patience: self.patience,
-            ..Limits::default().with_lease(self.lease)
+            ..WorkerLimits::default().with_lease(self.lease)
         };
         let door = Door::open(self.listen.unwrap_or(here), &self.access, limits, threads)?;
         if self.listen.is_some() {

@@ -2,6 +2,8 @@
 
 use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
+use nestrad_kernel::{BASE_BYTES, Block, Tracer};
+use nestrad_proto::near_field;
 use nestrad_proto::v1::{self, LeasedJob};
 use prost::Message;
 use tokio::sync::{Notify, OnceCell};
@@ -9,7 +11,6 @@ use tonic::Status;
 
 use super::Offer;
 use super::calls::{Master, again};
-use crate::{BASE_BYTES, Block, Demand, Tracer};
 
 /// A block, ready for the kernel.
 pub(super) struct Ready {
@@ -163,13 +164,13 @@ impl Blocks {
             let message = v1::Block::decode(&bytes[..]).map_err(|e| e.to_string())?;
             drop(bytes);
             // packed numbers can be many more than bytes: memory is taken only as far as it was announced
-            let taken_bytes = Demand::of_message(&message).block_bytes();
+            let taken_bytes = near_field::demand(&message).block_bytes();
             if taken_bytes > reserved_bytes {
                 return Err(format!(
                     "block takes {taken_bytes} bytes of memory, announced were {reserved_bytes}"
                 ));
             }
-            Block::new(&message).map_err(|e| e.to_string())
+            near_field::block(&message).map_err(|e| e.to_string())
         });
         let made = made.await.map_err(|e| Status::aborted(e.to_string()))?;
         let block = made.map_err(Status::data_loss)?;

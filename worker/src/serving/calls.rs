@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use bytes::Bytes;
+use nestrad_kernel::kernel;
 use nestrad_proto::channel::Authorized;
 use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
 use nestrad_proto::v1::{
@@ -14,7 +15,6 @@ use nestrad_proto::{MAX_MESSAGE_BYTES, SLICE_BYTES};
 use tonic::{Code, Request, Status};
 
 use super::{FIRST_PAUSE, LAST_PAUSE, Offer};
-use crate::kernel;
 
 /// An answer to a small request, and the next chunk of a large one, come within this time.
 const PATIENCE: Duration = Duration::from_secs(10);

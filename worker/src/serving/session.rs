@@ -4,6 +4,7 @@ use std::collections::BTreeSet;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
+use nestrad_proto::near_field;
 use nestrad_proto::v1::{GiveBackRequest, JoinResponse, LeasedJob, lease_response};
 use rayon::ThreadPool;
 use tokio::sync::watch;
@@ -176,7 +177,7 @@ impl Session {
             Err(status) if status.code() == Code::NotFound => return Err(Lost),
             Err(status) => return Ok(Err(status.message().to_owned())),
         };
-        let batch = job.batch.unwrap_or_default();
+        let batch = near_field::batch(&job.batch.unwrap_or_default());
         Ok(slot::compute(pool, block.ready(), batch).await)
     }
 

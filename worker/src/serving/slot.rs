@@ -5,12 +5,13 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use bytes::Bytes;
-use nestrad_proto::v1::{Batch, RowsHeader};
+use nestrad_kernel::job::Batch;
+use nestrad_kernel::trace;
+use nestrad_proto::v1::RowsHeader;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::oneshot;
 
 use super::blocks::Ready;
-use crate::trace_packed;
 
 /// A pool of one thread for each job at a time: jobs then neither wait for one another, nor take turns on
 /// one thread.
@@ -49,16 +50,18 @@ pub(super) async fn compute(
 
 fn rows(ready: &Ready, batch: &Batch) -> Computed {
     let begun = Instant::now();
-    let rows = trace_packed(&ready.block, || ready.tracer(), batch);
+    let seen = trace(&ready.block, || ready.tracer(), batch);
+    let rows = seen.packed(&ready.block);
+    let counts = rows.counts;
     Computed {
         header: RowsHeader {
             packed_bytes: rows.packed.len() as u64,
             checksum: blake3::hash(&rows.packed).as_bytes().to_vec(),
-            rows: rows.rows,
-            entries: rows.entries,
-            lines: rows.lines,
-            segments: rows.segments,
-            rays: rows.rays,
+            rows: ready.block.rows() as u32,
+            entries: counts.row_entries,
+            lines: counts.lines,
+            segments: counts.segments,
+            rays: counts.rays,
             compute_s: begun.elapsed().as_secs_f64(),
             ..RowsHeader::default()
         },

@@ -1,0 +1,189 @@
+//! The canopy: meshes with their organs and materials, the pattern, the soil. There is no light in it.
+
+mod mesh;
+mod weld;
+
+use std::fmt;
+
+use glam::{DAffine3, DVec2, DVec3};
+
+use crate::geometry;
+pub use mesh::{Mesh, Triangle};
+pub use weld::Welder;
+
+/// A canopy ready to be computed: checked, in metres, moved to a local origin.
+///
+/// Conventions: z up; the *upper* face of a triangle is the one that the right-hand normal
+/// `(v1 - v0) x (v2 - v0)` points to. Triangles are numbered from 0 through all instances, in their order;
+/// triangle, organ and material order is the user's.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Canopy {
+    meshes: Vec<Mesh>,
+    instances: Vec<Instance>,
+    /// Number of the first triangle of each instance, and of all triangles at the end.
+    first: Vec<usize>,
+    /// In order of first appearance.
+    pub organs: Vec<Organ>,
+    /// In order of first appearance; optics are looked up by this name.
+    pub materials: Vec<Material>,
+    /// What was subtracted from the user's coordinates (already in metres).
+    pub origin_m: DVec3,
+    /// The rectangle on which the canopy repeats for ever; `None` for an isolated scene.
+    pub pattern: Option<Pattern>,
+    /// Height of the soil plane, relative to `origin_m`; `None` for a black void below.
+    pub soil_z_m: Option<f64>,
+}
+
+/// A mesh in its place. The kernel computes with every instance's own triangles as yet.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Instance {
+    /// Index of the mesh.
+    pub mesh: u32,
+    /// Added to the mesh's organ numbers.
+    pub first_organ: u32,
+    /// Where it stands; `None` where the mesh is.
+    pub place: Option<DAffine3>,
+}
+
+impl Canopy {
+    /// Of meshes in metres, each instance of which is an index below their number.
+    pub fn new(meshes: Vec<Mesh>, instances: Vec<Instance>) -> Self {
+        let mut first = vec![0];
+        let mut total = 0;
+        for instance in &instances {
+            total += meshes[instance.mesh as usize].len();
+            first.push(total);
+        }
+        Self {
+            meshes,
+            instances,
+            first,
+            ..Self::default()
+        }
+    }
+
+    /// Of meshes that stand where they are.
+    pub fn of_meshes(meshes: Vec<Mesh>) -> Self {
+        let instance = |mesh| Instance {
+            mesh,
+            ..Instance::default()
+        };
+        let instances = (0..meshes.len() as u32).map(instance).collect();
+        Self::new(meshes, instances)
+    }
+
+    /// Number of triangles, those of all instances together.
+    pub fn len(&self) -> usize {
+        self.first.last().copied().unwrap_or(0)
+    }
+
+    /// No triangles at all.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// A triangle.
+    #[inline]
+    pub fn triangle(&self, number: usize) -> Triangle {
+        let at = match self.first[..] {
+            [_, _] => 0,
+            _ => self.first.partition_point(|&first| first <= number) - 1,
+        };
+        let instance = &self.instances[at];
+        let mut triangle = self.meshes[instance.mesh as usize].triangle(number - self.first[at]);
+        triangle.organ += instance.first_organ;
+        if let Some(place) = &instance.place {
+            triangle.corners_m = triangle.corners_m.map(|corner| place.transform_point3(corner));
+        }
+        triangle
+    }
+
+    /// All triangles, in order.
+    pub fn triangles(&self) -> impl ExactSizeIterator<Item = Triangle> + Clone {
+        (0..self.len()).map(|t| self.triangle(t))
+    }
+
+    /// The vertices of all triangles, in order, metres.
+    pub fn corners_m(&self) -> impl ExactSizeIterator<Item = [DVec3; 3]> + Clone {
+        self.triangles().map(|triangle| triangle.corners_m)
+    }
+
+    /// What a triangle is made of.
+    pub fn material_of(&self, triangle: &Triangle) -> &Material {
+        &self.materials[triangle.material as usize]
+    }
+
+    /// Whether each organ is of a plant: not all of it is soil.
+    pub fn plants(&self) -> Vec<bool> {
+        let mut plant = vec![true; self.organs.len()];
+        for triangle in self.triangles() {
+            plant[triangle.organ as usize] &= *self.material_of(&triangle) != Material::Soil;
+        }
+        plant
+    }
+
+    /// The corners of its box, without the soil plane; both zero where there is nothing.
+    pub fn bounds_m(&self) -> (DVec3, DVec3) {
+        geometry::bounds_of(self.corners_m()).unwrap_or_default()
+    }
+
+    /// Bytes that its triangles take.
+    pub fn bytes(&self) -> u64 {
+        self.meshes.iter().map(Mesh::bytes).sum()
+    }
+}
+
+/// A group of triangles that is reported as one.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Organ {
+    /// As in the output: for CAN, plant * 1000 + leaf; for OBJ, the group's name.
+    pub id: String,
+    /// The plant it belongs to: for CAN, the plant number; for OBJ, the object's name.
+    pub plant: String,
+}
+
+/// What a triangle is made of; a band gives it optical properties.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Material {
+    /// Opaque part of a CAN species (leaf number 0).
+    Stem {
+        /// Species number of the CAN label, 1 or more.
+        species: u32,
+    },
+    /// Leaf of a CAN species.
+    Leaf {
+        /// Species number of the CAN label, 1 or more.
+        species: u32,
+    },
+    /// Soil triangle (CAN species 0): opaque, with the soil's albedo.
+    Soil,
+    /// A material known by name (OBJ).
+    Named(String),
+}
+
+impl fmt::Display for Material {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Stem { species } => write!(f, "stem of species {species}"),
+            Self::Leaf { species } => write!(f, "leaf of species {species}"),
+            Self::Soil => f.write_str("soil"),
+            Self::Named(name) => f.write_str(name),
+        }
+    }
+}
+
+/// The rectangle in x, y on which a periodic canopy repeats, relative to the local origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pattern {
+    /// Lower corner, metres.
+    pub min_m: DVec2,
+    /// Extent in x and y, metres, both positive.
+    pub size_m: DVec2,
+}
+
+impl Pattern {
+    /// Area of the rectangle, m².
+    pub fn area_m2(&self) -> f64 {
+        self.size_m.x * self.size_m.y
+    }
+}

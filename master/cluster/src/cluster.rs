@@ -1,0 +1,258 @@
+//! The workers of a master, and what they work at.
+
+use std::collections::HashMap;
+use std::fmt;
+use std::hash::{BuildHasher, RandomState};
+use std::sync::mpsc::Sender;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
+use std::time::{Duration, Instant};
+
+use nestrad_engine::exchange::JobRows;
+use nestrad_proto::v1;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use tokio::sync::{Notify, Semaphore};
+
+use crate::blocks::SentBlock;
+use crate::scheduler::{Id, Rules, Scheduler, SolveCounts, Time, WorkerCounts};
+use crate::sending::Turns;
+
+/// What a master allows its workers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WorkerLimits {
+    /// Times and counts of the scheduler.
+    pub rules: Rules,
+    /// How often a worker is to be heard of.
+    pub heartbeat: Duration,
+    /// Bytes of results that are on their way in at a time; no single result is larger.
+    pub result_bytes: u32,
+    /// Workers at a time.
+    pub workers: usize,
+    /// Without any worker for so long, the master computes by itself.
+    pub patience: Duration,
+}
+
+impl Default for WorkerLimits {
+    fn default() -> Self {
+        let rules = Rules::default();
+        Self {
+            heartbeat: rules.lease / 6,
+            rules,
+            result_bytes: 1 << 30,
+            workers: 4096,
+            patience: Duration::from_secs(60),
+        }
+    }
+}
+
+impl WorkerLimits {
+    /// These limits with another lease time, and heartbeats to fit.
+    #[must_use]
+    pub fn with_lease(mut self, lease: Duration) -> Self {
+        self.rules.lease = lease;
+        self.heartbeat = lease / 6;
+        self
+    }
+}
+
+/// The workers of a master, and what they work at. Clones are the same cluster.
+#[derive(Clone)]
+pub struct Cluster(pub(crate) Arc<Shared>);
+
+pub(crate) struct Shared {
+    pub(crate) limits: WorkerLimits,
+    pub(crate) begun: Instant,
+    pub(crate) state: Mutex<ClusterState>,
+    /// There may be something to lease.
+    pub(crate) changed: Notify,
+    /// A worker has joined.
+    pub(crate) joined: Condvar,
+    /// Kibibytes of results that may come in now.
+    pub(crate) room: Semaphore,
+    /// Who is sent a block now.
+    pub(crate) turns: Turns,
+    /// Where rows are checked and joined.
+    pub(crate) compute: ThreadPool,
+    pub(crate) totals: Totals,
+}
+
+pub(crate) struct ClusterState {
+    pub(crate) scheduler: Scheduler,
+    pub(crate) solves: HashMap<Id, Open>,
+    /// Workers are told to leave.
+    pub(crate) draining: bool,
+    /// Workers are told to come back later.
+    pub(crate) closed: bool,
+    /// Why nothing can be computed any more.
+    pub(crate) failed: Option<String>,
+}
+
+/// A solve at which workers work.
+pub(crate) struct Open {
+    pub(crate) blocks: Vec<SentBlock>,
+    /// What the kernel is asked for each job.
+    pub(crate) batches: Vec<v1::Batch>,
+    /// Number of ends of its world.
+    pub(crate) ends: u32,
+    pub(crate) results: Sender<(usize, JobRows)>,
+}
+
+/// What has been done since the start.
+#[derive(Debug, Default)]
+pub(crate) struct Totals {
+    pub(crate) bytes_in: AtomicU64,
+    pub(crate) bytes_out: AtomicU64,
+    pub(crate) results: AtomicU64,
+    pub(crate) refused: AtomicU64,
+    pub(crate) segments: AtomicU64,
+    pub(crate) rays: AtomicU64,
+}
+
+/// The state of a cluster at one moment.
+#[derive(Clone, Debug, Default)]
+pub struct ClusterStatus {
+    /// Every worker that is known.
+    pub workers: Vec<WorkerCounts>,
+    /// Jobs of all solves together.
+    pub jobs: SolveCounts,
+    /// What those jobs that are not done should take, seconds on one thread.
+    pub left_s: f64,
+    /// Bytes of rows that came in, and of blocks that went out, since the start.
+    pub bytes_in: u64,
+    /// See `bytes_in`.
+    pub bytes_out: u64,
+    /// Results that were taken, and that were refused.
+    pub results: u64,
+    /// See `results`.
+    pub refused: u64,
+    /// Leases that were lost or failed.
+    pub lost: u64,
+    /// Segments and rays of all results.
+    pub segments: u64,
+    /// See `segments`.
+    pub rays: u64,
+}
+
+impl ClusterStatus {
+    /// Seconds until all jobs are done, going by what those that are done took; `None` without jobs or
+    /// workers.
+    pub fn eta_s(&self) -> Option<f64> {
+        let threads: u32 = self.workers.iter().map(|w| w.facts.threads).sum();
+        let known = threads > 0 && self.jobs.waiting + self.jobs.leased > 0;
+        known.then(|| self.left_s / f64::from(threads))
+    }
+}
+
+impl fmt::Debug for Cluster {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Cluster").field(&self.status()).finish()
+    }
+}
+
+impl Cluster {
+    /// A cluster without workers, that checks and joins rows on so many threads, 0 for one per
+    /// processor. To be called within a tokio runtime.
+    pub fn start(limits: WorkerLimits, threads: usize) -> Result<Self, ThreadPoolBuildError> {
+        let compute = ThreadPoolBuilder::new().num_threads(threads).build()?;
+        // what a master before this one gave out is not to be taken for this one's
+        let first_id = RandomState::new().hash_one(Instant::now()) >> 1;
+        let shared = Arc::new(Shared {
+            begun: Instant::now(),
+            state: Mutex::new(ClusterState {
+                scheduler: Scheduler::new(limits.rules, first_id),
+                solves: HashMap::new(),
+                draining: false,
+                closed: false,
+                failed: None,
+            }),
+            changed: Notify::new(),
+            joined: Condvar::new(),
+            turns: Turns::new(),
+            room: Semaphore::new(kibibytes(u64::from(limits.result_bytes)) as usize),
+            compute,
+            totals: Totals::default(),
+            limits,
+        });
+        tokio::spawn(watch(Arc::downgrade(&shared)));
+        Ok(Self(shared))
+    }
+
+    /// Tells all workers to leave as soon as they ask for a job.
+    pub fn drain(&self) {
+        self.lock().draining = true;
+        self.0.changed.notify_waiters();
+    }
+
+    /// Gives out no more jobs: workers that ask are to ask again later, when there may be another master.
+    pub fn close(&self) {
+        self.lock().closed = true;
+        self.0.changed.notify_waiters();
+    }
+
+    /// Ends all solves, now and later: there will be no workers.
+    pub fn fail(&self, reason: &str) {
+        self.lock().failed = Some(reason.to_owned());
+    }
+
+    /// Whether anybody is there to compute.
+    pub fn has_workers(&self) -> bool {
+        self.lock().scheduler.facts().next().is_some()
+    }
+
+    /// How it stands.
+    pub fn status(&self) -> ClusterStatus {
+        let now = self.now();
+        let state = self.lock();
+        let workers = state.scheduler.workers(now);
+        let mut jobs = SolveCounts::default();
+        for solve in state.solves.keys() {
+            jobs += state.scheduler.counts(*solve).unwrap_or_default();
+        }
+        let totals = &self.0.totals;
+        let of = |total: &AtomicU64| total.load(Ordering::Relaxed);
+        ClusterStatus {
+            workers,
+            jobs,
+            left_s: state.scheduler.left_s(),
+            bytes_in: of(&totals.bytes_in),
+            bytes_out: of(&totals.bytes_out),
+            results: of(&totals.results),
+            refused: of(&totals.refused),
+            lost: state.scheduler.lost(),
+            segments: of(&totals.segments),
+            rays: of(&totals.rays),
+        }
+    }
+
+    pub(crate) fn now(&self) -> Time {
+        self.0.begun.elapsed()
+    }
+
+    pub(crate) fn lock(&self) -> MutexGuard<'_, ClusterState> {
+        // the state is whole between any two calls of the scheduler
+        self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// How often it is looked whether leases are overdue, or jobs take too long.
+const TICK: Duration = Duration::from_millis(100);
+
+/// Takes back what is overdue, for as long as there is a cluster.
+async fn watch(cluster: Weak<Shared>) {
+    let mut tick = tokio::time::interval(TICK);
+    tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);
+    loop {
+        tick.tick().await;
+        let Some(shared) = cluster.upgrade() else {
+            return;
+        };
+        let cluster = Cluster(shared);
+        let now = cluster.now();
+        cluster.lock().scheduler.expire(now);
+        cluster.0.changed.notify_waiters();
+    }
+}
+
+pub(crate) fn kibibytes(bytes: u64) -> u32 {
+    u32::try_from(bytes.div_ceil(1 << 10)).unwrap_or(u32::MAX)
+}

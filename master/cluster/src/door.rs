@@ -1,0 +1,123 @@
+//! The door of a cluster that one solve has to itself: where workers come in.
+
+use std::io;
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use nestrad_proto::access::{Access, AccessError};
+use rayon::ThreadPoolBuildError;
+use thiserror::Error;
+use tokio::net::TcpListener;
+use tokio::runtime::{Builder, Runtime};
+use tokio::sync::oneshot;
+use tonic::transport::server::TcpIncoming;
+
+use crate::cluster::{Cluster, WorkerLimits};
+use crate::service::worker_service;
+
+/// How long workers may take to leave at the end.
+const FAREWELL: Duration = Duration::from_secs(5);
+
+/// How often it is looked whether they have.
+const PAUSE: Duration = Duration::from_millis(20);
+
+/// An open door. Closing it sends the workers home.
+pub struct Door {
+    cluster: Cluster,
+    address: SocketAddr,
+    runtime: Option<Runtime>,
+    close: Option<oneshot::Sender<()>>,
+}
+
+/// Why a door cannot be opened.
+#[derive(Debug, Error)]
+pub enum DoorError {
+    /// The address is taken, or not this machine's.
+    #[error("cannot listen at {address}")]
+    Listen {
+        /// Where it was to listen.
+        address: SocketAddr,
+        /// What the system says.
+        source: io::Error,
+    },
+    /// Not without credentials.
+    #[error(transparent)]
+    Access(#[from] AccessError),
+    /// There are no threads for it.
+    #[error("cannot start threads")]
+    Runtime(#[source] io::Error),
+    /// There are no threads to check results with.
+    #[error("cannot start threads")]
+    Threads(#[from] ThreadPoolBuildError),
+}
+
+impl Door {
+    /// Opens a door at an address, where port 0 stands for any that is free. Results are checked on so
+    /// many threads.
+    pub fn open(
+        address: SocketAddr,
+        access: &Access,
+        limits: WorkerLimits,
+        threads: usize,
+    ) -> Result<Self, DoorError> {
+        let runtime = Builder::new_multi_thread()
+            .worker_threads(2)
+            .enable_all()
+            .build()
+            .map_err(DoorError::Runtime)?;
+        let listen = |source| DoorError::Listen { address, source };
+        let entered = runtime.enter();
+        let listener = runtime
+            .block_on(TcpListener::bind(address))
+            .map_err(listen)?;
+        let at = listener.local_addr().map_err(listen)?;
+        let cluster = Cluster::start(limits, threads)?;
+        let mut server = access.server(at)?;
+        let (close, closed) = oneshot::channel();
+        let serving = server
+            .add_service(worker_service(cluster.clone()))
+            .serve_with_incoming_shutdown(
+                TcpIncoming::from(listener).with_nodelay(Some(true)),
+                async {
+                    // the sender that is gone closes, too
+                    let _ = closed.await;
+                },
+            );
+        runtime.spawn(async {
+            if let Err(error) = serving.await {
+                tracing::error!(%error, "the door for workers broke");
+            }
+        });
+        drop(entered);
+        Ok(Self {
+            cluster,
+            address: at,
+            runtime: Some(runtime),
+            close: Some(close),
+        })
+    }
+
+    /// The workers behind it.
+    pub fn cluster(&self) -> &Cluster {
+        &self.cluster
+    }
+
+    /// Where it is.
+    pub fn address(&self) -> SocketAddr {
+        self.address
+    }
+}
+
+impl Drop for Door {
+    fn drop(&mut self) {
+        self.cluster.drain();
+        let begun = Instant::now();
+        while self.cluster.has_workers() && begun.elapsed() < FAREWELL {
+            std::thread::sleep(PAUSE);
+        }
+        drop(self.close.take());
+        if let Some(runtime) = self.runtime.take() {
+            runtime.shutdown_timeout(PAUSE);
+        }
+    }
+}

@@ -1,0 +1,276 @@
+//! The file of a store: one redb database.
+
+use std::fs;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+use nestrad_kernel::PackedRows;
+use nestrad_kernel::rows::Counts;
+use redb::{Database, DatabaseError, ReadableDatabase, ReadableTable, Table, TableDefinition};
+
+use super::Key;
+
+/// Results by name: a BLAKE3 of what follows it, four counters, the packed rows.
+const RESULTS: TableDefinition<&[u8], &[u8]> = TableDefinition::new("results");
+
+/// Names and sizes of results, by the order in which they came.
+const ORDER: TableDefinition<u64, (&[u8], u64)> = TableDefinition::new("order");
+
+/// Checksum and counters.
+const HEAD: usize = 32 + 4 * 8;
+
+/// Memory for pages of the file, bytes.
+const CACHE_BYTES: usize = 16 << 20;
+
+pub(super) struct File {
+    database: Database,
+    path: PathBuf,
+    /// Of all results.
+    bytes: u64,
+    /// Of the file.
+    most_bytes: u64,
+    next: u64,
+}
+
+/// A file grows by doubling, and has pages of powers of two: so that it never exceeds its bound, it is made to
+/// take no more than half of that between writes, and results no more than a quarter. No file is smaller than
+/// `LEAST_BYTES`.
+const AT_REST: u64 = 2;
+const FILLED: u64 = 4;
+const LEAST_BYTES: u64 = 2 << 20;
+
+pub(super) enum FileError {
+    InUse,
+    Other(String),
+}
+
+impl From<redb::Error> for FileError {
+    fn from(error: redb::Error) -> Self {
+        Self::Other(error.to_string())
+    }
+}
+
+/// A library that meets bytes it did not write may panic: that is a fault of the file.
+fn guarded<T>(what: impl FnOnce() -> Result<T, redb::Error>) -> Result<T, FileError> {
+    catch_unwind(AssertUnwindSafe(what))
+        .unwrap_or_else(|_| Err(redb::Error::Corrupted("the file is broken".to_owned())))
+        .map_err(FileError::from)
+}
+
+impl File {
+    pub(super) fn open(path: &Path, most_bytes: u64) -> Result<Self, FileError> {
+        let opened = catch_unwind(|| Database::builder().set_cache_size(CACHE_BYTES).create(path));
+        let database = match opened {
+            Ok(Ok(database)) => database,
+            Ok(Err(DatabaseError::DatabaseAlreadyOpen)) => return Err(FileError::InUse),
+            Ok(Err(error)) => return Err(FileError::Other(error.to_string())),
+            Err(_) => return Err(FileError::Other("the file is broken".to_owned())),
+        };
+        guarded(|| {
+            let begun = database.begin_write()?;
+            let (mut bytes, mut next) = (0, 0);
+            {
+                begun.open_table(RESULTS)?;
+                for entry in begun.open_table(ORDER)?.iter()? {
+                    let (number, of) = entry?;
+                    bytes += of.value().1;
+                    next = number.value() + 1;
+                }
+            }
+            begun.commit()?;
+            Ok((bytes, next))
+        })
+        .map(|(bytes, next)| Self {
+            database,
+            path: path.to_owned(),
+            bytes,
+            most_bytes,
+            next,
+        })
+        .and_then(|mut file| file.bound().map(|()| file))
+    }
+
+    /// Length of the file.
+    fn length(&self) -> u64 {
+        fs::metadata(&self.path).map_or(0, |file| file.len())
+    }
+
+    /// Most bytes of all results.
+    fn most_results(&self) -> u64 {
+        self.most_bytes / FILLED
+    }
+
+    /// Makes the file as small as it is to be: lets go of the oldest results, and of the room of those that
+    /// are gone.
+    fn bound(&mut self) -> Result<(), FileError> {
+        let mut most = self.most_results();
+        let at_rest = (self.most_bytes / AT_REST).max(LEAST_BYTES);
+        if self.bytes > most {
+            self.drop_to(most)?;
+        }
+        while self.length() > at_rest {
+            let database = &mut self.database;
+            guarded(|| {
+                while database.compact()? {}
+                Ok(())
+            })?;
+            if self.length() <= at_rest || self.bytes == 0 {
+                break;
+            }
+            most = most.min(self.bytes) / 4 * 3;
+            self.drop_to(most)?;
+        }
+        Ok(())
+    }
+
+    fn drop_to(&mut self, most: u64) -> Result<(), FileError> {
+        let mut bytes = self.bytes;
+        self.bytes = guarded(|| {
+            let begun = self.database.begin_write()?;
+            {
+                let mut by_name = begun.open_table(RESULTS)?;
+                let mut order = begun.open_table(ORDER)?;
+                drop_oldest(&mut by_name, &mut order, &mut bytes, most)?;
+            }
+            begun.commit()?;
+            Ok(bytes)
+        })?;
+        Ok(())
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        self.bytes
+    }
+
+    /// The result of that name; nothing where it is not whole.
+    pub(super) fn get(&self, key: &Key) -> Result<Option<PackedRows>, String> {
+        let read = guarded(|| {
+            let begun = self.database.begin_read()?;
+            let found = begun.open_table(RESULTS)?.get(&key[..])?;
+            Ok(found.and_then(|found| unpack(found.value())))
+        });
+        read.map_err(FileError::text)
+    }
+
+    /// Whether there is a result of that name.
+    pub(super) fn has(&self, key: &Key) -> bool {
+        let found = guarded(|| {
+            let begun = self.database.begin_read()?;
+            Ok(begun.open_table(RESULTS)?.get(&key[..])?.is_some())
+        });
+        found.unwrap_or(false)
+    }
+
+    /// Keeps results, and lets go of the oldest ones where they are too many.
+    pub(super) fn put(&mut self, results: &[(Key, Arc<PackedRows>)]) -> Result<(), String> {
+        // what is written at a time stands beside what it takes the place of
+        let most = (self.most_results() / 2).max(1) as usize;
+        let mut taken = 0;
+        let together = results.chunk_by(|(_, a), (_, b)| {
+            taken = if taken == 0 { a.packed.len() } else { taken } + b.packed.len();
+            let fits = taken <= most;
+            taken = if fits { taken } else { 0 };
+            fits
+        });
+        for some in together {
+            self.write(some)?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, results: &[(Key, Arc<PackedRows>)]) -> Result<(), String> {
+        let most = self.most_results();
+        let written = guarded(|| {
+            let (mut bytes, mut next) = (self.bytes, self.next);
+            let begun = self.database.begin_write()?;
+            {
+                let mut by_name = begun.open_table(RESULTS)?;
+                let mut order = begun.open_table(ORDER)?;
+                for (key, rows) in results {
+                    let value = pack(rows);
+                    let size = value.len() as u64;
+                    if size > most {
+                        continue;
+                    }
+                    // a broken one is written over, and keeps its place
+                    if by_name.insert(&key[..], &value[..])?.is_some() {
+                        continue;
+                    }
+                    order.insert(next, (&key[..], size))?;
+                    (bytes, next) = (bytes + size, next + 1);
+                    drop_oldest(&mut by_name, &mut order, &mut bytes, most)?;
+                }
+            }
+            begun.commit()?;
+            Ok((bytes, next))
+        });
+        (self.bytes, self.next) = written.map_err(FileError::text)?;
+        self.bound().map_err(FileError::text)
+    }
+}
+
+/// Lets go of the oldest results until they take no more than that.
+fn drop_oldest(
+    by_name: &mut Table<&[u8], &[u8]>,
+    order: &mut Table<u64, (&[u8], u64)>,
+    bytes: &mut u64,
+    most: u64,
+) -> Result<(), redb::Error> {
+    while *bytes > most {
+        let Some((_, oldest)) = order.pop_first()? else {
+            break;
+        };
+        let (name, size) = oldest.value();
+        by_name.remove(name)?;
+        *bytes -= size;
+    }
+    Ok(())
+}
+
+impl FileError {
+    fn text(self) -> String {
+        match self {
+            Self::InUse => "in use".to_owned(),
+            Self::Other(reason) => reason,
+        }
+    }
+}
+
+fn pack(rows: &PackedRows) -> Vec<u8> {
+    let mut value = vec![0; 32];
+    let counts = rows.counts;
+    for number in [
+        counts.lines,
+        counts.segments,
+        counts.rays,
+        counts.row_entries,
+    ] {
+        value.extend_from_slice(&number.to_le_bytes());
+    }
+    value.extend_from_slice(&rows.packed);
+    let checksum = *blake3::hash(&value[32..]).as_bytes();
+    value[..32].copy_from_slice(&checksum);
+    value
+}
+
+fn unpack(value: &[u8]) -> Option<PackedRows> {
+    let (checksum, rest) = value.split_first_chunk::<32>()?;
+    if value.len() < HEAD || blake3::hash(rest).as_bytes() != checksum {
+        return None;
+    }
+    let number = |k: usize| {
+        let mut bytes = [0; 8];
+        bytes.copy_from_slice(&rest[8 * k..8 * (k + 1)]);
+        u64::from_le_bytes(bytes)
+    };
+    Some(PackedRows {
+        counts: Counts {
+            lines: number(0),
+            segments: number(1),
+            rays: number(2),
+            row_entries: number(3),
+        },
+        packed: value[HEAD..].to_vec(),
+    })
+}

@@ -1,0 +1,128 @@
+//! What the rows see that is not a radiosity to solve for: sky, void, soil beyond the map, burial.
+
+use std::borrow::Cow;
+
+use rayon::prelude::*;
+
+use super::Exchange;
+use crate::frame::Frame;
+
+/// What the rows see that is not a radiosity to solve for.
+#[derive(Clone, Debug, Default)]
+pub struct Outlook {
+    /// One over the number of lines of a row that count, in each half; 0 for a row without.
+    pub weight: [Vec<f64>; 2],
+    /// The part of each row that is not buried in something solid.
+    pub exposed: Vec<f64>,
+    /// The part of what each row sends out that leaves to the sky, by the lines of each half.
+    pub to_sky: [Vec<f64>; 2],
+    /// The part that leaves downwards, or to the soil beyond the map.
+    pub to_void: [Vec<f64>; 2],
+    /// The part of what each row sees that is soil beyond the map of an open scene.
+    pub outer_soil: Vec<f64>,
+    /// Rows none of whose lines count, and how many of their lines are buried.
+    blind: Vec<(u32, usize)>,
+}
+
+impl Outlook {
+    /// Counts what is seen by each row.
+    pub fn of(frame: &Frame, exchange: &Exchange) -> Self {
+        let seen: Vec<[Seen; 2]> = (0..frame.rows())
+            .into_par_iter()
+            .map(|row| [0, 1].map(|h: usize| Seen::of(frame, exchange.halves[h].row(row))))
+            .collect();
+        // a row without lines in a half is judged by those of the other
+        let part = |of: fn(&Seen) -> usize| {
+            [0, 1].map(|h: usize| {
+                let judge = |s: &[Seen; 2]| if s[h].counted > 0 { s[h] } else { s[1 - h] };
+                seen.iter()
+                    .map(|s| per(of(&judge(s)), judge(s).counted))
+                    .collect::<Vec<f64>>()
+            })
+        };
+        let blind = |(row, [a, b]): (u32, &[Seen; 2])| {
+            (a.counted + b.counted == 0).then_some((row, a.buried + b.buried))
+        };
+        Self {
+            weight: [0, 1].map(|h: usize| seen.iter().map(|s| per(1, s[h].counted)).collect()),
+            exposed: seen
+                .par_iter()
+                .enumerate()
+                .map(|(row, [a, b])| {
+                    let lines = (a.counted + b.counted, a.buried + b.buried);
+                    frame.share_above_soil(row) * exposed(lines)
+                })
+                .collect(),
+            to_sky: part(|s| s.sky),
+            to_void: part(|s| s.void),
+            outer_soil: seen
+                .iter()
+                .map(|[a, b]| per(a.outer + b.outer, a.counted + b.counted))
+                .collect(),
+            blind: (0..).zip(&seen).filter_map(blind).collect(),
+        }
+    }
+
+    /// The same where a source shines on the rows of which `lit` holds.
+    ///
+    /// What is lit is not buried, though all lines of a row that peeps out of the soil by a hair may say so: it
+    /// counts as if one line more had seen the sky.
+    pub fn lit(&self, frame: &Frame, lit: impl Fn(usize) -> bool) -> Cow<'_, Self> {
+        let mut outlook = Cow::Borrowed(self);
+        for &(row, buried) in &self.blind {
+            let row = row as usize;
+            if lit(row) {
+                let outlook = outlook.to_mut();
+                outlook.weight[0][row] = 1.0;
+                outlook.exposed[row] = frame.share_above_soil(row) * exposed((1, buried));
+                for to_sky in &mut outlook.to_sky {
+                    to_sky[row] = 1.0;
+                }
+            }
+        }
+        outlook
+    }
+}
+
+fn per(part: usize, of: usize) -> f64 {
+    if of == 0 {
+        0.0
+    } else {
+        part as f64 / of as f64
+    }
+}
+
+/// The part of a row that is not buried, by the lines that count and those that do not.
+fn exposed((counted, buried): (usize, usize)) -> f64 {
+    match buried {
+        0 => 1.0,
+        _ => per(counted, counted + buried),
+    }
+}
+
+/// Lines of a row in one half, by what they see.
+#[derive(Clone, Copy, Default)]
+struct Seen {
+    /// All that are not buried.
+    counted: usize,
+    buried: usize,
+    sky: usize,
+    void: usize,
+    outer: usize,
+}
+
+impl Seen {
+    fn of(frame: &Frame, row: &[u32]) -> Self {
+        let (ends, mut seen) = (&frame.ends, Self::default());
+        for &end in row {
+            let buried = end == ends.buried();
+            seen.buried += usize::from(buried);
+            seen.counted += usize::from(!buried);
+            seen.sky += usize::from(end == ends.sky());
+            let outer = end == ends.outer_soil();
+            seen.outer += usize::from(outer);
+            seen.void += usize::from(outer || end == ends.void());
+        }
+        seen
+    }
+}

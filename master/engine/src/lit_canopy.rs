@@ -1,0 +1,16 @@
+//! A canopy in its light, as it is planned and computed.
+
+use nestrad_common::canopy::Canopy;
+use nestrad_common::light::Sources;
+use nestrad_common::optics::Optics;
+
+/// A canopy, its optics, and the parallel sources that its light is computed as.
+#[derive(Clone, Copy, Debug)]
+pub struct LitCanopy<'a> {
+    /// The geometry.
+    pub canopy: &'a Canopy,
+    /// Of its materials, in its order.
+    pub optics: &'a Optics,
+    /// What shines on it.
+    pub sources: &'a Sources,
+}

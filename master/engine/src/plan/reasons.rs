@@ -1,0 +1,128 @@
+//! The plan in words, one line each, with the reason.
+
+use nestrad_common::canopy::{Canopy, Material};
+use nestrad_common::options::Diameter;
+
+use super::{Estimator, Plan, Settings};
+use crate::lit_canopy::LitCanopy;
+
+/// Says what a plan does and why.
+pub(super) fn of(lit: &LitCanopy, settings: &Settings, plan: &Plan) -> Vec<String> {
+    let mut lines = vec![light(lit, plan), bands(lit, plan)];
+    lines.push(exchange(settings, plan));
+    lines.push(field(lit.canopy, settings, plan));
+    lines.push(faces(lit.canopy));
+    lines.push(soil(lit.canopy, plan));
+    lines.push(format!(
+        "memory: about {:.2} GiB (scene {:.2}, rows {:.2}, solver {:.2}) of {} GiB allowed",
+        plan.memory.total_GiB(),
+        plan.memory.scene_GiB,
+        plan.memory.rows_GiB,
+        plan.memory.solver_GiB,
+        settings.memory_GiB
+    ));
+    lines
+}
+
+fn light(lit: &LitCanopy, plan: &Plan) -> String {
+    let pitch_mm = 1e3 * plan.light.direct_line_area_m2.sqrt();
+    match lit.sources.list.len() {
+        0 => "light: none, so nothing is lit".to_owned(),
+        n => {
+            format!("light: {n} parallel sources, projected at {pitch_mm:.2} mm for the strongest")
+        }
+    }
+}
+
+fn bands(lit: &LitCanopy, plan: &Plan) -> String {
+    let names = |scatters: bool| -> Vec<&str> {
+        (0..lit.optics.len())
+            .filter(|b| plan.light.scattering_bands.contains(b) == scatters)
+            .map(|b| lit.optics.bands[b].name.as_str())
+            .collect()
+    };
+    match (names(true), names(false)) {
+        (scatter, black) if black.is_empty() => format!("bands: {} scatter", scatter.join(", ")),
+        (scatter, black) if scatter.is_empty() => {
+            format!(
+                "bands: {} black or unlit, so direct light only",
+                black.join(", ")
+            )
+        }
+        (scatter, black) => {
+            format!(
+                "bands: {} scatter; {} black or unlit, so direct light only",
+                scatter.join(", "),
+                black.join(", ")
+            )
+        }
+    }
+}
+
+fn exchange(settings: &Settings, plan: &Plan) -> String {
+    let Some(s) = &plan.trace.sampling else {
+        return "exchange: none, because nothing scatters".to_owned();
+    };
+    match settings.estimator {
+        Estimator::Lines => format!(
+            "exchange: {} directions of lines {:.1} mm apart, for an accuracy of {} %",
+            s.batches * s.sets_per_batch * s.axes.count(),
+            1e3 * s.line_area_m2.sqrt(),
+            (1e3 * plan.aims.exchange_percent).round() / 1e3
+        ),
+        Estimator::Rays => format!(
+            "exchange: {} rays from every face, as asked",
+            2.0 * s.least_samples
+        ),
+    }
+}
+
+fn field(canopy: &Canopy, settings: &Settings, plan: &Plan) -> String {
+    match (plan.trace.radius_m, plan.trace.far_field, settings.diameter) {
+        (Some(r), Some(f), _) => format!(
+            "near field: within {r} m; beyond it {} levels x {} bins per hemisphere, closed on the solution",
+            f.levels, f.bins
+        ),
+        (_, _, Diameter::Metres(_))
+            if plan.trace.sampling.is_some() && canopy.pattern.is_none() =>
+        {
+            "near field: full; no far field, because the scene does not repeat".to_owned()
+        }
+        (_, _, Diameter::Metres(d)) if plan.trace.sampling.is_some() => {
+            format!(
+                "near field: full; no far field, because no line of sight is longer than {} m",
+                0.5 * d
+            )
+        }
+        _ if plan.trace.sampling.is_some() => {
+            "near field: full; no far field, because the rows fit the memory".to_owned()
+        }
+        _ => "near field: none; far field: none".to_owned(),
+    }
+}
+
+fn faces(canopy: &Canopy) -> String {
+    let solid = canopy
+        .triangles()
+        .filter(|t| matches!(canopy.material_of(t), Material::Stem { .. }))
+        .count();
+    format!(
+        "faces: two for each of {} triangles; {solid} of them enclose something solid, where leaves that stick in it are dark",
+        canopy.len()
+    )
+}
+
+fn soil(canopy: &Canopy, plan: &Plan) -> String {
+    let triangles = canopy
+        .triangles()
+        .filter(|t| *canopy.material_of(t) == Material::Soil)
+        .count();
+    let plane = match canopy.soil_z_m {
+        Some(_) => format!(
+            "a plane in cells of about {:.1} cm",
+            100.0 * plan.trace.soil_cell_m
+        ),
+        None => "no plane: black below".to_owned(),
+    };
+    format!("soil: {plane}; {triangles} triangles")
+}

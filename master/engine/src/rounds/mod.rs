@@ -1,0 +1,330 @@
+//! Solves in rounds until the error that was asked for is reached.
+//!
+//! The first round is planned for what was asked, and is the only one where nothing was; or it is a coarse look,
+//! where that costs little beside it or where time is short. Where its own errors say that it missed, the next is
+//! planned by what the last one measured (`next.rs`).
+
+mod next;
+mod work;
+
+use std::fmt;
+use std::time::Instant;
+
+use nestrad_common::light::Sources;
+use nestrad_common::scene::Scene;
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use crate::causes::causes;
+use crate::exchange::RowSource;
+use crate::lit_canopy::LitCanopy;
+use crate::plan::{Aims, Plan, PlanError, Settings, WorkCounts};
+use crate::run::Run;
+use crate::solution::{BandAccount, Solution};
+use crate::stopwatch::Stopwatch;
+use crate::traced::{self, SolveError, WorkDone};
+use next::Measured;
+use work::work_s;
+
+/// The last round, and how it came to it.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    /// Its plan.
+    pub plan: Plan,
+    /// Its results.
+    pub solution: Solution,
+    /// How much it computed.
+    pub work: WorkDone,
+    /// What was asked for, and what came of it.
+    pub accuracy: Accuracy,
+}
+
+/// A plan as it is kept with the results.
+#[derive(Debug, Serialize)]
+pub struct PlanRecord<'a> {
+    #[serde(flatten)]
+    plan: &'a Plan,
+    accuracy: &'a Accuracy,
+}
+
+impl Solved {
+    /// What is kept of the plan.
+    pub fn plan_record(&self) -> PlanRecord<'_> {
+        PlanRecord {
+            plan: &self.plan,
+            accuracy: &self.accuracy,
+        }
+    }
+}
+
+/// What was asked for, and what came of it.
+#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Accuracy {
+    /// Error that was asked for: of the worst band, rms over organs, percent of the mean.
+    pub asked_percent: f64,
+    /// Why there was no further round.
+    pub ended: Ended,
+    /// All rounds.
+    pub rounds: Vec<Round>,
+    /// What the error of the last one comes from, by band.
+    pub errors: Vec<BandAccount>,
+    /// Why a finer round failed, where one did.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<String>,
+}
+
+/// A round.
+#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
+pub struct Round {
+    /// What its parts were planned for.
+    pub planned: Aims,
+    /// Error of its worst band, by its own account; none where nothing is absorbed.
+    pub reached_percent: Option<f64>,
+}
+
+/// Why there was no further round.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Ended {
+    /// The error is what was asked for, or less.
+    Reached,
+    /// A finer one would have taken longer than allowed.
+    OutOfTime,
+    /// A finer one would have taken more memory, or more lines, than there may be.
+    BeyondLimits,
+    /// There have been enough.
+    OutOfRounds,
+    /// What is left cannot be planned for: the mean field beyond the sphere, or the directions of a sky that were
+    /// given.
+    NoFiner,
+    /// A finer one failed.
+    Failed,
+    /// No accuracy was asked for: what the default comes to has to do.
+    NotAsked,
+}
+
+impl fmt::Display for Accuracy {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Some(parts) = worst(&self.errors) else {
+            return f.write_str("nothing is absorbed, so there is no error");
+        };
+        let failed;
+        let why = match self.ended {
+            Ended::Reached => "",
+            Ended::OutOfTime => ", because the time allowed is up",
+            Ended::BeyondLimits => ", because finer plans are beyond the limits",
+            Ended::OutOfRounds => ", however fine it was planned",
+            Ended::NoFiner => ", because no finer plan would help",
+            Ended::Failed => {
+                let cause = self.failure.as_deref().unwrap_or("no reason known");
+                failed = format!(", because a finer round failed: {cause}");
+                &failed
+            }
+            Ended::NotAsked => ", which is no more than the default: --accuracy sees to it",
+        };
+        write!(
+            f,
+            "{:.2} % reached in {}, aimed at {} %{why}; from",
+            parts.total_percent(),
+            parts.band,
+            self.asked_percent,
+        )?;
+        let (mut comma, largest) = ("", parts.largest());
+        for (percent, name) in parts.named().into_iter().filter(|part| part.0 > 0.0) {
+            let most = if name == largest {
+                " (the largest)"
+            } else {
+                ""
+            };
+            write!(f, "{comma} {name} {percent:.2}{most}")?;
+            comma = ",";
+        }
+        f.write_str(" %")
+    }
+}
+
+/// Why there is no result.
+#[derive(Debug, Error)]
+pub enum RoundsError {
+    /// No plan can be made.
+    #[error(transparent)]
+    Plan(#[from] PlanError),
+    /// A solve failed.
+    #[error(transparent)]
+    Solve(#[from] SolveError),
+}
+
+/// A coarse look comes first where it takes less than this part of what is planned without one.
+const WORTH_A_LOOK: f64 = 0.2;
+
+/// Never more rounds than this.
+const MOST_ROUNDS: usize = 5;
+
+/// Solves until the accuracy of the settings is reached, or their time is up. This is where a sky becomes
+/// directions: as many as a round aims for. `begins` is told of every plan before it is carried out, and of the
+/// rounds before it.
+pub fn solve_in_rounds(
+    scene: &Scene,
+    settings: &Settings,
+    rows: &dyn RowSource,
+    run: &Run,
+    watch: &mut Stopwatch,
+    mut begins: impl FnMut(&Plan, &[Round]),
+) -> Result<Solved, RoundsError> {
+    let begun = Instant::now();
+    let asked = settings.accuracy_percent;
+    let (mut sources, mut plan) = first(scene, settings)?;
+    let mut rounds = Vec::new();
+    let mut last: Option<Solved> = None;
+    loop {
+        begins(&plan, &rounds);
+        watch.lap("plan");
+        run.stop.check().map_err(SolveError::from)?;
+        let round_begun = Instant::now();
+        let lit = lit_canopy(scene, &sources);
+        let (solution, work) = match (traced::solve(&lit, &plan, rows, run, watch), last) {
+            (Ok(done), _) => done,
+            // whoever wants no more does not want the round before either
+            (Err(error @ SolveError::Stopped(_)), _) | (Err(error), None) => {
+                return Err(error.into());
+            }
+            (Err(error), Some(mut before)) => {
+                before.accuracy.failure = Some(causes(&error));
+                return Ok(before);
+            }
+        };
+        let took_s = round_begun.elapsed().as_secs_f64();
+        let reached_percent = worst(&solution.account).map(BandAccount::total_percent);
+        rounds.push(Round {
+            planned: plan.aims,
+            reached_percent,
+        });
+        let measured = Measured {
+            aims: plan.aims,
+            coarsest_exchange_percent: plan.coarsest_exchange_percent(&scene.canopy),
+            errors: &solution.account,
+            sky_is_fixed: scene.light.sky.is_none() || plan.aims.has_most_sky_directions(),
+            cost_s: work_s(&WorkCounts::of(&lit, &plan)),
+        };
+        let left_s = settings.budget_s.map(|s| s - begun.elapsed().as_secs_f64());
+        let next = if reached_percent.is_none_or(|reached| reached <= asked) {
+            Err(Ended::Reached)
+        } else if !settings.in_rounds {
+            Err(Ended::NotAsked)
+        } else if rounds.len() >= MOST_ROUNDS {
+            Err(Ended::OutOfRounds)
+        } else {
+            following(&measured, asked, left_s.map(|left_s| (took_s, left_s)))
+        };
+        let next = next.and_then(|aims| {
+            let sources = if aims.sky_percent < plan.aims.sky_percent {
+                sources_for(scene, &aims, settings)
+            } else {
+                sources.clone()
+            };
+            let plan = Plan::aimed(&lit_canopy(scene, &sources), settings, &aims);
+            plan.map(|plan| (sources, plan))
+                .map_err(|_| Ended::BeyondLimits)
+        });
+        let solved = Solved {
+            accuracy: Accuracy {
+                asked_percent: asked,
+                ended: next.as_ref().err().copied().unwrap_or(Ended::Failed),
+                rounds: rounds.clone(),
+                errors: solution.account.clone(),
+                failure: None,
+            },
+            plan,
+            solution,
+            work,
+        };
+        match next {
+            Ok(next) => {
+                (sources, plan) = next;
+                last = Some(solved);
+            }
+            Err(_) => return Ok(solved),
+        }
+    }
+}
+
+/// The first round: what is asked for, or a coarse look where that saves.
+fn first(scene: &Scene, settings: &Settings) -> Result<(Sources, Plan), PlanError> {
+    let aims = Aims::of(settings.accuracy_percent);
+    let sources = sources_for(scene, &aims, settings);
+    let plan = Plan::new(&lit_canopy(scene, &sources), settings);
+    if !settings.in_rounds {
+        return Ok((sources, plan?));
+    }
+    let aims = Aims::pilot(settings.accuracy_percent);
+    let coarse = sources_for(scene, &aims, settings);
+    let look = Plan::aimed(&lit_canopy(scene, &coarse), settings, &aims);
+    let all_s = |sources, plan| {
+        let counts = WorkCounts::of(&lit_canopy(scene, sources), plan);
+        work_s(&counts).iter().sum::<f64>()
+    };
+    match (plan, look) {
+        (Ok(plan), Ok(look))
+            if settings.budget_s.is_some()
+                || all_s(&coarse, &look) < WORTH_A_LOOK * all_s(&sources, &plan) =>
+        {
+            Ok((coarse, look))
+        }
+        // it may not need as much as it was planned with
+        (Err(PlanError::Memory { .. } | PlanError::Elements { .. }), Ok(look)) => {
+            Ok((coarse, look))
+        }
+        (plan, _) => Ok((sources, plan?)),
+    }
+}
+
+/// The sources of a scene, with as many directions of its sky as the aims ask for.
+fn sources_for(scene: &Scene, aims: &Aims, settings: &Settings) -> Sources {
+    scene.light.sources(aims.sky_directions(), settings.seed)
+}
+
+fn lit_canopy<'a>(scene: &'a Scene, sources: &'a Sources) -> LitCanopy<'a> {
+    LitCanopy {
+        canopy: &scene.canopy,
+        optics: &scene.optics,
+        sources,
+    }
+}
+
+/// What to plan the next round for; where time is limited, with what the last one took and what is left.
+fn following(
+    measured: &Measured,
+    asked: f64,
+    took_and_left_s: Option<(f64, f64)>,
+) -> Result<Aims, Ended> {
+    let finer = measured.finer(asked).ok_or(Ended::NoFiner)?;
+    let finer = match took_and_left_s {
+        Some((took_s, left_s)) => measured
+            .within(finer, took_s, left_s)
+            .ok_or(Ended::OutOfTime)?,
+        None => finer,
+    };
+    Ok(measured.aims(&finer))
+}
+
+/// The band with the largest error.
+fn worst(errors: &[BandAccount]) -> Option<&BandAccount> {
+    let by_total =
+        |a: &&BandAccount, b: &&BandAccount| a.total_percent().total_cmp(&b.total_percent());
+    errors.iter().max_by(by_total)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_band_with_the_largest_error_counts() {
+        let of = |exchange_percent| BandAccount {
+            exchange_percent,
+            ..BandAccount::default()
+        };
+        assert_eq!(worst(&[of(0.1), of(0.3)]), Some(&of(0.3)));
+        assert_eq!(worst(&[]), None);
+    }
+}

@@ -1,0 +1,311 @@
+//! What to plan the next round for: pure arithmetic on what the last one measured.
+//!
+//! The error of each part is taken to fall in proportion to what it is planned for, and its cost to rise with
+//! the square. The least cost of a sum of squares then gives each part a share of the square that goes with the
+//! root of its cost times its error (Lagrange).
+
+use super::work::{PARTS, PerPart};
+use crate::plan::Aims;
+use crate::solution::BandAccount;
+
+/// A round, as the next one is planned from it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Measured<'a> {
+    /// What it was planned for.
+    pub(super) aims: Aims,
+    /// Planning for a larger error than this would have made its exchange no coarser.
+    pub(super) coarsest_exchange_percent: f64,
+    /// What came of it, by band.
+    pub(super) errors: &'a [BandAccount],
+    /// Whether there are no more directions of the sky to be had.
+    pub(super) sky_is_fixed: bool,
+    /// What each part took, roughly, s.
+    pub(super) cost_s: PerPart,
+}
+
+/// The next round aims a bit lower than it must: errors of errors.
+const AIM: f64 = 0.85;
+
+/// No part is planned finer than the last time by more than this: the cost grows with its square. Elements that are
+/// uncut triangles tell less of smaller ones.
+const MOST_FINER: PerPart = [10.0, 10.0, 10.0, 3.5];
+
+/// Where what cannot be planned for leaves less than this of the square, the rest would have to be far finer than
+/// is asked for, and the whole hardly better.
+const LEAST_LEFT: f64 = 0.3;
+
+impl Measured<'_> {
+    /// By how much each part has to err less; none where no plan helps, because what cannot be planned for is too
+    /// much alone.
+    pub(super) fn finer(&self, asked_percent: f64) -> Option<PerPart> {
+        // the solver is as much finer as the exchange
+        let without_solver = self.finer_with(asked_percent, 0.0)?;
+        let solver = self.aims(&without_solver).exchange_percent / self.aims.exchange_percent;
+        self.finer_with(asked_percent, solver)
+    }
+
+    /// The same where so much of the solver's error is left.
+    fn finer_with(&self, asked_percent: f64, solver: f64) -> Option<PerPart> {
+        let aimed = AIM * asked_percent;
+        let mut bands = Vec::new();
+        for band in self.errors {
+            let parts = self.parts(band).map(|e| e * e);
+            let left = (aimed - solver * band.solver_percent).max(0.0).powi(2);
+            let left = left - self.fixed_square(band);
+            if parts.iter().sum::<f64>() > left && left <= LEAST_LEFT * aimed * aimed {
+                return None;
+            }
+            if left > 0.0 {
+                bands.push(parts.map(|square| square / left));
+            }
+        }
+        let factors = allot(&bands, &self.cost_s);
+        Some(std::array::from_fn(|k| factors[k].max(1.0 / MOST_FINER[k])))
+    }
+
+    /// The parts that can be planned for.
+    fn parts(&self, parts: &BandAccount) -> PerPart {
+        [
+            parts.exchange_percent,
+            parts.direct_percent,
+            if self.sky_is_fixed {
+                0.0
+            } else {
+                parts.sky_percent
+            },
+            parts.elements_percent,
+        ]
+    }
+
+    /// The square of what cannot.
+    fn fixed_square(&self, parts: &BandAccount) -> f64 {
+        let sky = if self.sky_is_fixed {
+            parts.sky_percent
+        } else {
+            0.0
+        };
+        sky * sky + parts.far_field_percent * parts.far_field_percent
+    }
+
+    /// The same where only so much time is left, when the last round took `took_s`; none where what fits would
+    /// hardly help.
+    pub(super) fn within(&self, finer: PerPart, took_s: f64, left_s: f64) -> Option<PerPart> {
+        let longer = |part: f64| {
+            let cost: f64 = (0..PARTS)
+                .map(|k| self.cost_s[k] * finer[k].powf(-2.0 * part))
+                .sum();
+            cost / self.cost_s.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+        };
+        let fits = |part: f64| took_s * longer(part) <= left_s;
+        if fits(1.0) {
+            return Some(finer);
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..30 {
+            let middle = 0.5 * (low + high);
+            if fits(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        (low > HARDLY).then(|| finer.map(|s| s.powf(low)))
+    }
+
+    /// The aims that go with errors smaller by these factors.
+    pub(super) fn aims(&self, finer: &PerPart) -> Aims {
+        let last = &self.aims;
+        let exchange = if finer[0] < 1.0 {
+            last.exchange_percent.min(self.coarsest_exchange_percent)
+        } else {
+            last.exchange_percent
+        };
+        Aims {
+            exchange_percent: exchange * finer[0],
+            direct_percent: last.direct_percent * finer[1],
+            sky_percent: last.sky_percent * finer[2],
+            elements_percent: last.elements_percent * finer[3],
+        }
+    }
+}
+
+/// A round that goes less than this part of the way is not worth its time.
+const HARDLY: f64 = 0.2;
+
+/// Factors on errors, at most 1, that bring the sum of squares of each band down to 1 for the least cost.
+///
+/// With a multiplier m for each band, the squares of the factors are `sqrt(cost / sum of m e²)` (Lagrange); a
+/// multiplier grows while its band's sum is too large, and shrinks while it has room.
+fn allot(bands: &[PerPart], cost_s: &PerPart) -> PerPart {
+    const STEPS: usize = 200;
+    let mut multipliers = vec![1.0; bands.len()];
+    let mut squares = [1.0; PARTS];
+    let sum = |band: &PerPart, squares: &PerPart| -> f64 {
+        band.iter().zip(squares).map(|(e, s)| e * s).sum()
+    };
+    for _ in 0..STEPS {
+        squares = std::array::from_fn(|k| {
+            let price: f64 = bands
+                .iter()
+                .zip(&multipliers)
+                .map(|(band, m)| m * band[k])
+                .sum();
+            let cost = cost_s[k].max(f64::MIN_POSITIVE);
+            if price > 0.0 {
+                (cost / price).sqrt().min(1.0)
+            } else {
+                1.0
+            }
+        });
+        for (band, m) in bands.iter().zip(&mut multipliers) {
+            *m *= sum(band, &squares);
+        }
+    }
+    // what the steps leave
+    let most = bands
+        .iter()
+        .map(|band| sum(band, &squares))
+        .fold(1.0, f64::max);
+    squares.map(|s| (s / most).sqrt())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parts(percent: PerPart) -> BandAccount {
+        let [
+            exchange_percent,
+            direct_percent,
+            sky_percent,
+            elements_percent,
+        ] = percent;
+        BandAccount {
+            exchange_percent,
+            direct_percent,
+            sky_percent,
+            elements_percent,
+            ..BandAccount::default()
+        }
+    }
+
+    fn measured(errors: &[BandAccount]) -> Measured<'_> {
+        Measured {
+            aims: Aims::of(0.5),
+            coarsest_exchange_percent: 0.7,
+            errors,
+            sky_is_fixed: false,
+            cost_s: [1.0, 0.5, 0.0, 0.5],
+        }
+    }
+
+    #[test]
+    fn all_bands_are_brought_down_to_what_is_asked_for() {
+        let errors = [parts([0.2, 0.9, 0.0, 0.1]), parts([0.8, 0.1, 0.0, 0.9])];
+        let finer = measured(&errors).finer(0.5).unwrap();
+        for band in &errors {
+            let parts = measured(&errors).parts(band);
+            let square: f64 = (0..PARTS).map(|k| (parts[k] * finer[k]).powi(2)).sum();
+            assert!(
+                square <= (AIM * 0.5).powi(2) * 1.000_001,
+                "{square} {finer:?}"
+            );
+        }
+        assert!(finer.iter().all(|&s| s <= 1.0), "{finer:?}");
+        assert_eq!(finer[2], 1.0);
+    }
+
+    #[test]
+    fn a_part_alone_has_all_of_the_error() {
+        let errors = [parts([0.9, 0.0, 0.0, 0.0])];
+        let finer = measured(&errors).finer(0.5).unwrap();
+        assert!((finer[0] - AIM * 0.5 / 0.9).abs() < 1e-9, "{finer:?}");
+    }
+
+    /// It was taken off as if it stayed: a look that left 0.07 % to the solver made the next round a third dearer.
+    #[test]
+    fn what_a_look_leaves_to_the_solver_is_not_left_by_the_next_round() {
+        let look = BandAccount {
+            solver_percent: 0.07,
+            ..parts([2.0, 0.0, 0.0, 0.0])
+        };
+        let finer = measured(&[look]).finer(0.5).unwrap();
+        let left = AIM * 0.5 - 0.07 * finer[0];
+        assert!((finer[0] * 2.0 / left - 1.0).abs() < 0.01, "{finer:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_planned_for_ends_it() {
+        let far = BandAccount {
+            far_field_percent: 3.0,
+            ..parts([0.1; 4])
+        };
+        assert_eq!(measured(&[far]).finer(0.5), None);
+    }
+
+    #[test]
+    fn a_band_that_nothing_helps_is_not_passed_over_for_one_that_is_noisier() {
+        let far = BandAccount {
+            far_field_percent: 2.3,
+            ..parts([0.1; 4])
+        };
+        assert_eq!(measured(&[parts([0.6; 4]), far]).finer(2.0), None);
+    }
+
+    #[test]
+    fn a_sky_that_has_no_more_directions_is_not_chased() {
+        let errors = [parts([0.9, 0.0, 0.5, 0.0])];
+        let mut measured = measured(&errors);
+        assert!(measured.finer(0.5).is_some_and(|finer| finer[2] < 1.0));
+        measured.sky_is_fixed = true;
+        assert_eq!(measured.finer(0.5), None);
+        // what it leaves is for the others
+        let finer = measured.finer(1.0).unwrap();
+        assert!(finer[0] < 1.0 && finer[2] == 1.0, "{finer:?}");
+    }
+
+    #[test]
+    fn no_other_split_of_the_error_costs_less() {
+        let (errors, cost) = ([0.8, 0.6, 0.0, 0.9], [1.0, 0.5, 0.0, 0.3]);
+        let of = |f: &PerPart| (0..PARTS).map(|k| cost[k] / (f[k] * f[k])).sum::<f64>();
+        let best = allot(&[errors.map(|e: f64| e * e / 0.2)], &cost);
+        let all: f64 = (0..PARTS).map(|k| (best[k] * errors[k]).powi(2)).sum();
+        assert!((all / 0.2 - 1.0).abs() < 1e-9, "{all}");
+        for (a, b) in [(0, 1), (0, 3), (1, 3)] {
+            for step in [-0.01, 0.01] {
+                let mut other = best;
+                let square = |f: f64, k: usize| (f * errors[k]).powi(2);
+                other[a] = best[a] * (1.0 + step);
+                let left = square(best[a], a) + square(best[b], b) - square(other[a], a);
+                other[b] = left.sqrt() / errors[b];
+                assert!(of(&other) > of(&best), "{other:?}");
+            }
+        }
+    }
+
+    /// Bands were brought down one after the other, each by all of its parts: direct light that PAR needed was made
+    /// 15 times finer by the time that NIR had had its turn, where 6 times are enough.
+    #[test]
+    fn a_part_that_one_band_needs_is_no_finer_for_the_sake_of_another() {
+        let bands = [[0.284, 2.0, 0.0, 0.3], [0.596, 0.6, 0.0, 1.0]];
+        let squares = bands.map(|band| band.map(|e: f64| (e / 0.45).powi(2)));
+        let factors = allot(&squares, &[1.45, 0.02, 0.0, 0.8]);
+        for band in squares {
+            let sum: f64 = (0..PARTS).map(|k| band[k] * factors[k].powi(2)).sum();
+            assert!(sum < 1.000_001, "{sum} {factors:?}");
+        }
+        assert!(factors[1] > 0.15, "{factors:?}");
+    }
+
+    #[test]
+    fn a_round_that_fits_no_more_is_made_coarser_or_left_out() {
+        let errors = [parts([1.0, 0.5, 0.0, 0.5])];
+        let measured = measured(&errors);
+        let finer = [0.25, 0.5, 1.0, 0.5];
+        assert_eq!(measured.within(finer, 1.0, 100.0), Some(finer));
+        let fits = measured.within(finer, 1.0, 4.0).unwrap();
+        assert!(fits[0] > finer[0] && fits[0] < 1.0, "{fits:?}");
+        assert_eq!(measured.within(finer, 1.0, 1.1), None);
+        assert_eq!(measured.within(finer, 1.0, -1.0), None);
+    }
+}

@@ -1,0 +1,296 @@
+//! The results of a solve, read back from its folder.
+
+use std::collections::HashMap;
+use std::fs;
+use std::path::Path;
+
+use nestrad_common::options::Unit;
+use nestrad_engine::rounds::Accuracy;
+use nestrad_engine::solution::Balance;
+use serde::de::Error;
+use serde::{Deserialize, Serialize};
+
+use super::error::ReportError;
+use super::profile::PatchLight;
+use super::table::Table;
+
+/// What a report needs of `summary.json`.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct SummaryFacts {
+    pub(crate) version: String,
+    pub(crate) options: OptionFacts,
+    pub(crate) scene: SceneFacts,
+    pub(crate) plan: PlanFacts,
+    pub(crate) energy_balance: Vec<Balance>,
+    pub(crate) error_estimates: Vec<SpreadFacts>,
+    pub(crate) resources: serde_json::Value,
+}
+
+/// The options that were in force.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct OptionFacts {
+    pub(crate) scenes: Vec<String>,
+    pub(crate) unit: Unit,
+    pub(crate) light: String,
+    pub(crate) sources: usize,
+    pub(crate) accuracy_percent: f64,
+    pub(crate) seed: u64,
+}
+
+/// The scene in short.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct SceneFacts {
+    pub(crate) pattern_m: Option<[f64; 2]>,
+    pub(crate) soil_z_m: Option<f64>,
+    pub(crate) plants: usize,
+    pub(crate) area_index: Option<f64>,
+}
+
+/// What the plan said.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct PlanFacts {
+    pub(crate) scale: ScaleFacts,
+    pub(crate) reasons: Vec<String>,
+    /// What the errors come from; results of an earlier version do not have it.
+    pub(crate) accuracy: Option<Accuracy>,
+}
+
+/// Sizes that the plan is made by.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct ScaleFacts {
+    pub(crate) ground_area_m2: f64,
+}
+
+/// Standard error over all organs.
+#[derive(Clone, Debug, Deserialize, Serialize)]
+pub(crate) struct SpreadFacts {
+    pub(crate) band: String,
+    pub(crate) rms_percent: Option<f64>,
+}
+
+/// An organ and its light.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Organ {
+    pub(crate) plant: String,
+    pub(crate) organ: String,
+    pub(crate) area_m2: f64,
+    /// Per band.
+    pub(crate) light: Vec<OrganLight>,
+}
+
+/// The light of an organ in a band.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub(crate) struct OrganLight {
+    pub(crate) upper_W_m2: f64,
+    pub(crate) lower_W_m2: f64,
+    pub(crate) absorbed_W: f64,
+    pub(crate) direct_W: f64,
+    pub(crate) se_W: f64,
+}
+
+/// Triangles and their light.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Triangles {
+    pub(crate) area_m2: Vec<f64>,
+    /// Index of its organ in the table of organs.
+    pub(crate) organ: Vec<u32>,
+    /// Bands of a triangle one after the other.
+    pub(crate) light: Vec<PatchLight>,
+}
+
+/// The soil plane and its light.
+#[derive(Clone, Debug, Serialize)]
+pub(crate) struct Soil {
+    pub(crate) nx: usize,
+    pub(crate) ny: usize,
+    /// Centre of the first cell, in the user's coordinates.
+    pub(crate) first_m: [f64; 2],
+    pub(crate) cell_m: [f64; 2],
+    /// Per band and cell.
+    pub(crate) irradiance_W_m2: Vec<Vec<f32>>,
+}
+
+/// All of a result.
+#[derive(Clone, Debug)]
+pub(crate) struct Results {
+    pub(crate) summary: SummaryFacts,
+    pub(crate) bands: Vec<String>,
+    pub(crate) organs: Vec<Organ>,
+    pub(crate) triangles: Triangles,
+    pub(crate) soil: Option<Soil>,
+}
+
+/// Reads a folder of results.
+pub(crate) fn read(folder: &Path) -> Result<Results, ReportError> {
+    let summary = summary(folder)?;
+    let is_there = |name: &str| folder.join(name).exists();
+    if is_there("triangles.parquet") && !is_there("triangles.csv") {
+        let folder = folder.to_owned();
+        return Err(ReportError::Parquet { folder });
+    }
+    let balance = summary.energy_balance.iter();
+    let bands: Vec<String> = balance.map(|balance| balance.band.clone()).collect();
+    let organs = organs(folder, &bands)?;
+    let triangles = triangles(folder, &bands, &organs)?;
+    let soil = if is_there("soil.csv") {
+        soil(folder, &bands)?
+    } else {
+        None
+    };
+    Ok(Results {
+        summary,
+        bands,
+        organs,
+        triangles,
+        soil,
+    })
+}
+
+fn summary(folder: &Path) -> Result<SummaryFacts, ReportError> {
+    let path = folder.join("summary.json");
+    if !path.exists() {
+        let folder = folder.to_owned();
+        return Err(ReportError::NoResult { folder });
+    }
+    let text = match fs::read_to_string(&path) {
+        Ok(text) => text,
+        Err(source) => return Err(ReportError::Read { path, source }),
+    };
+    let read = serde_json::from_str(&text).and_then(|summary: SummaryFacts| {
+        if summary.energy_balance.is_empty() {
+            return Err(serde_json::Error::custom("energy_balance has no bands"));
+        }
+        Ok(summary)
+    });
+    read.map_err(|source| ReportError::Summary { path, source })
+}
+
+fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
+    let columns = [
+        "plant",
+        "organ",
+        "area_m2",
+        "band",
+        "irradiance_upper_W_m2",
+        "irradiance_lower_W_m2",
+        "absorbed_W",
+        "absorbed_direct_W",
+        "absorbed_se_W",
+    ];
+    let mut organs: Vec<Organ> = Vec::new();
+    let mut rows = 0;
+    let table = Table::read(folder.join("organs.csv"))?;
+    table.rows(&columns, |row| {
+        row.must_be(3, &bands[rows % bands.len()])?;
+        if rows.is_multiple_of(bands.len()) {
+            organs.push(Organ {
+                plant: row.text(0).to_owned(),
+                organ: row.text(1).to_owned(),
+                area_m2: row.real(2)?,
+                light: Vec::with_capacity(bands.len()),
+            });
+        }
+        if let Some(organ) = organs.last_mut() {
+            organ.light.push(OrganLight {
+                upper_W_m2: row.real(4)?,
+                lower_W_m2: row.real(5)?,
+                absorbed_W: row.real(6)?,
+                direct_W: row.real(7)?,
+                se_W: row.real(8)?,
+            });
+        }
+        rows += 1;
+        Ok(())
+    })?;
+    if !rows.is_multiple_of(bands.len()) {
+        return Err(table.is_cut_off(rows));
+    }
+    Ok(organs)
+}
+
+fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triangles, ReportError> {
+    let columns = [
+        "triangle",
+        "plant",
+        "organ",
+        "area_m2",
+        "band",
+        "irradiance_upper_W_m2",
+        "irradiance_lower_W_m2",
+        "absorbed_W_m2",
+        "absorbed_direct_W_m2",
+    ];
+    let by_name: HashMap<(&str, &str), u32> = organs
+        .iter()
+        .zip(0..)
+        .map(|(organ, index)| ((organ.plant.as_str(), organ.organ.as_str()), index))
+        .collect();
+    let mut found = Triangles::default();
+    let table = Table::read(folder.join("triangles.csv"))?;
+    table.rows(&columns, |row| {
+        let (triangle, band) = (
+            found.light.len() / bands.len(),
+            found.light.len() % bands.len(),
+        );
+        if row.index(0)? != triangle {
+            return Err(row.not(&format!("triangle {triangle}"), row.text(0)));
+        }
+        row.must_be(4, &bands[band])?;
+        if band == 0 {
+            let name = (row.text(1), row.text(2));
+            let organ = by_name.get(&name).copied();
+            let organ = organ.ok_or_else(|| row.not("an organ of organs.csv", row.text(2)))?;
+            found.organ.push(organ);
+            found.area_m2.push(row.real(3)?);
+        }
+        found.light.push(PatchLight {
+            irradiance_W_m2: row.real(5)? + row.real(6)?,
+            absorbed_W_m2: row.real(7)?,
+            direct_W_m2: row.real(8)?,
+        });
+        Ok(())
+    })?;
+    if !found.light.len().is_multiple_of(bands.len()) {
+        return Err(table.is_cut_off(found.light.len()));
+    }
+    Ok(found)
+}
+
+fn soil(folder: &Path, bands: &[String]) -> Result<Option<Soil>, ReportError> {
+    let columns = [
+        "ix",
+        "iy",
+        "x_m",
+        "y_m",
+        "cell_x_m",
+        "cell_y_m",
+        "band",
+        "irradiance_W_m2",
+    ];
+    let mut soil: Option<Soil> = None;
+    let mut rows = 0;
+    let table = Table::read(folder.join("soil.csv"))?;
+    table.rows(&columns, |row| {
+        let band = rows % bands.len();
+        row.must_be(6, &bands[band])?;
+        let place = [row.real(2)?, row.real(3)?];
+        let cell_m = [row.real(4)?, row.real(5)?];
+        let soil = soil.get_or_insert_with(|| Soil {
+            nx: 0,
+            ny: 0,
+            first_m: place,
+            cell_m,
+            irradiance_W_m2: vec![Vec::new(); bands.len()],
+        });
+        // cells come row by row: the last one has the largest numbers
+        (soil.nx, soil.ny) = (row.index(0)? + 1, row.index(1)? + 1);
+        soil.irradiance_W_m2[band].push(row.real(7)? as f32);
+        rows += 1;
+        Ok(())
+    })?;
+    let cells = soil.as_ref().map_or(0, |soil| soil.nx * soil.ny);
+    if rows != cells * bands.len() {
+        return Err(table.is_cut_off(rows));
+    }
+    Ok(soil)
+}

@@ -1,0 +1,345 @@
+//! The result as a compact table on the terminal.
+//!
+//! One line per band: what comes in and where it goes, each with its standard error, per m² of
+//! ground where there is a pattern and for the whole scene where there is none. Columns of what a
+//! scene does not have (soil, a void below) are left out. Five significant digits of the light that
+//! comes in are shown, or fewer where the table would not fit into 80 columns.
+
+use std::fmt::Write as _;
+use std::io::{self, Write};
+
+use nestrad_common::canopy::Canopy;
+use nestrad_engine::account::organ_spread;
+use nestrad_engine::solution::{Balance, Estimate, Solution};
+use nestrad_engine::stopwatch::Usage;
+
+const COLUMNS: usize = 80;
+
+/// Writes the energy balance of all bands, the standard error of organs, and what it cost.
+pub fn write(
+    out: &mut impl Write,
+    canopy: &Canopy,
+    solution: &Solution,
+    usage: Usage,
+) -> io::Result<()> {
+    write_balance(out, canopy, &solution.balance)?;
+    write_organ_errors(out, canopy, solution)?;
+    write_usage(out, usage)
+}
+
+/// A column of the table: heading, and what stands in it.
+type Flow = (&'static str, fn(&Balance) -> Estimate);
+
+fn flows(balance: &[Balance]) -> Vec<Flow> {
+    let always: [Flow; 2] = [
+        ("plants", |b| b.absorbed_plants_W),
+        ("reflected", |b| b.escaped_up_W),
+    ];
+    let only_where_there_is_some: [Flow; 2] = [
+        ("soil", |b| b.absorbed_soil_W),
+        ("lost below", |b| b.escaped_down_W),
+    ];
+    let [plants, reflected] = always;
+    let mut flows = vec![plants];
+    flows.extend(
+        only_where_there_is_some
+            .into_iter()
+            .filter(|(_, flow)| balance.iter().any(|b| matters(flow(b), b.incoming_W))),
+    );
+    flows.extend([reflected, ("closure", |b: &Balance| b.closure_W)]);
+    flows
+}
+
+/// More than five digits of the light that comes in could show.
+fn matters(flow: Estimate, incoming_W: f64) -> bool {
+    flow.value.abs().max(flow.se) > 1e-5 * incoming_W
+}
+
+fn write_balance(out: &mut impl Write, canopy: &Canopy, balance: &[Balance]) -> io::Result<()> {
+    let area_m2 = canopy.pattern.map_or(1.0, |pattern| pattern.area_m2());
+    let largest = balance
+        .iter()
+        .fold(0.0, |max, b| f64::max(max, b.incoming_W))
+        / area_m2;
+    let unit = Unit::fitting(largest);
+    let per = if canopy.pattern.is_some() {
+        "W per m² of ground"
+    } else {
+        "W, whole scene"
+    };
+    writeln!(out, "light in {}{per} (± one standard error)", unit.prefix)?;
+
+    let mut decimals = unit.decimals(largest);
+    loop {
+        let rows = rows(balance, unit.scale * area_m2, decimals);
+        let widths = widths(&rows);
+        let total = widths.iter().sum::<usize>() + 2 * (widths.len() - 1);
+        if total <= COLUMNS || decimals == 0 {
+            return rows.iter().try_for_each(|row| write_row(out, row, &widths));
+        }
+        decimals -= 1;
+    }
+}
+
+/// All cells as text, the heading first.
+fn rows(balance: &[Balance], divisor: f64, decimals: usize) -> Vec<Vec<String>> {
+    let flows = flows(balance);
+    let heading = ["band", "incoming"]
+        .into_iter()
+        .chain(flows.iter().map(|(name, _)| *name));
+    let mut rows = vec![heading.map(str::to_owned).collect::<Vec<_>>()];
+    for band in balance {
+        let mut row = vec![
+            shortened(&band.band),
+            fixed(band.incoming_W / divisor, decimals),
+        ];
+        row.extend(flows.iter().map(|(_, flow)| {
+            let Estimate { value, se } = flow(band);
+            format!(
+                "{} ±{}",
+                fixed(value / divisor, decimals),
+                fixed(se / divisor, decimals)
+            )
+        }));
+        rows.push(row);
+    }
+    rows
+}
+
+fn widths(rows: &[Vec<String>]) -> Vec<usize> {
+    let columns = rows.first().map_or(0, Vec::len);
+    let width = |column: usize| rows.iter().map(|row| row[column].chars().count()).max();
+    (0..columns)
+        .map(|column| width(column).unwrap_or(0))
+        .collect()
+}
+
+/// Names to the left, numbers to the right.
+fn write_row(out: &mut impl Write, row: &[String], widths: &[usize]) -> io::Result<()> {
+    for (column, (cell, &width)) in row.iter().zip(widths).enumerate() {
+        match column {
+            0 => write!(out, "{cell:width$}")?,
+            _ => write!(out, "  {cell:>width$}")?,
+        }
+    }
+    writeln!(out)
+}
+
+/// A band's name in twelve columns at most.
+fn shortened(name: &str) -> String {
+    if name.chars().count() <= 12 {
+        return name.to_owned();
+    }
+    name.chars().take(11).chain(['…']).collect()
+}
+
+/// Fixed decimals, without the minus sign of a zero.
+fn fixed(value: f64, decimals: usize) -> String {
+    let text = format!("{value:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(zero) if zero.bytes().all(|byte| matches!(byte, b'0' | b'.')) => zero.to_owned(),
+        _ => text,
+    }
+}
+
+/// A decimal multiple of the watt.
+struct Unit {
+    prefix: &'static str,
+    scale: f64,
+}
+
+impl Unit {
+    /// The unit in which `largest` has one to four digits before the point.
+    fn fitting(largest: f64) -> Self {
+        let (prefix, scale) = match largest {
+            w if w >= 1e7 => ("M", 1e6),
+            w if w >= 1e4 => ("k", 1e3),
+            w if w >= 1.0 || w == 0.0 => ("", 1.0),
+            w if w >= 1e-3 => ("m", 1e-3),
+            w if w >= 1e-6 => ("µ", 1e-6),
+            _ => ("n", 1e-9),
+        };
+        Self { prefix, scale }
+    }
+
+    /// Decimals that make five significant digits of `largest`.
+    fn decimals(&self, largest: f64) -> usize {
+        match largest / self.scale {
+            w if w >= 1e4 => 0,
+            w if w >= 1e3 => 1,
+            w if w >= 1e2 => 2,
+            w if w >= 1e1 => 3,
+            _ => 4,
+        }
+    }
+}
+
+fn write_organ_errors(
+    out: &mut impl Write,
+    canopy: &Canopy,
+    solution: &Solution,
+) -> io::Result<()> {
+    let mut line = String::from("standard error of an organ, rms, of the mean:");
+    for spread in organ_spread(&canopy.plants(), solution) {
+        let Some(percent) = spread.rms_percent else {
+            continue;
+        };
+        let entry = format!(" {} {percent:.2} %;", shortened(&spread.band));
+        if line.chars().count() + entry.chars().count() > COLUMNS {
+            writeln!(out, "{line}")?;
+            line = String::from(" ");
+        }
+        line.push_str(&entry);
+    }
+    match line.strip_suffix(';') {
+        Some(line) => writeln!(out, "{line}"),
+        None => Ok(()),
+    }
+}
+
+fn write_usage(out: &mut impl Write, usage: Usage) -> io::Result<()> {
+    let mut line = format!(
+        "{:.2} s, {:.2} s of processor time",
+        usage.wall_s, usage.cpu_s
+    );
+    if let Some(bytes) = usage.peak_memory_bytes {
+        let mebibytes = bytes.div_ceil(1 << 20);
+        // writing to a String does not fail
+        let _ = write!(line, ", at most {mebibytes} MiB of memory");
+    }
+    writeln!(out, "{line}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::{DVec2, DVec3};
+    use nestrad_common::canopy::{Material, Mesh, Organ, Pattern, Triangle};
+    use nestrad_engine::solution::ItemLight;
+
+    fn estimate(value: f64, se: f64) -> Estimate {
+        Estimate { value, se }
+    }
+
+    fn band(name: &str, factor: f64) -> Balance {
+        Balance {
+            band: name.into(),
+            incoming_W: 900.0 * factor,
+            absorbed_plants_W: estimate(760.246 * factor, 0.3 * factor),
+            absorbed_soil_W: estimate(80.0 * factor, 0.21 * factor),
+            escaped_up_W: estimate(59.79 * factor, 0.24 * factor),
+            escaped_down_W: estimate(0.0, 0.0),
+            closure_W: estimate(-0.004 * factor, 0.02 * factor),
+        }
+    }
+
+    /// Two triangles: a leaf of 1 m², whose standard error is 0.5 %, and soil.
+    fn canopy_and_solution(pattern: Option<Pattern>, balance: Vec<Balance>) -> (Canopy, Solution) {
+        let organ = |id: &str| Organ {
+            id: id.into(),
+            plant: "1".into(),
+        };
+        let triangle = |number| Triangle {
+            corners_m: [DVec3::ZERO; 3],
+            organ: number,
+            material: number,
+        };
+        let mut canopy = Canopy::of_meshes(vec![Mesh::from_iter([0, 1].map(triangle))]);
+        canopy.organs = vec![organ("1001"), organ("0")];
+        canopy.materials = vec![Material::Leaf { species: 1 }, Material::Soil];
+        canopy.pattern = pattern;
+        let light = |absorbed_se_W| ItemLight {
+            absorbed_W: 2.0,
+            absorbed_se_W,
+            ..ItemLight::default()
+        };
+        let mut organs = vec![light(0.01); balance.len()];
+        organs.extend(vec![light(1.0); balance.len()]);
+        let solution = Solution {
+            organs,
+            organ_area_m2: vec![1.0, 50.0],
+            triangle_area_m2: vec![1.0, 50.0],
+            balance,
+            ..Solution::default()
+        };
+        (canopy, solution)
+    }
+
+    fn shown(pattern: Option<Pattern>, balance: Vec<Balance>) -> String {
+        let (canopy, solution) = canopy_and_solution(pattern, balance);
+        let usage = Usage {
+            wall_s: 1.234,
+            cpu_s: 2.345,
+            peak_memory_bytes: Some(300 << 20),
+        };
+        let mut out = Vec::new();
+        write(&mut out, &canopy, &solution, usage).expect("written");
+        String::from_utf8_lossy(&out).into_owned()
+    }
+
+    fn two_square_metres() -> Option<Pattern> {
+        Some(Pattern {
+            min_m: DVec2::ZERO,
+            size_m: DVec2::new(1.0, 2.0),
+        })
+    }
+
+    #[test]
+    fn a_canopy_over_soil() {
+        let text = shown(
+            two_square_metres(),
+            vec![band("PAR", 1.0), band("NIR", 0.8)],
+        );
+        let expected = "\
+light in W per m² of ground (± one standard error)
+band  incoming        plants         soil    reflected     closure
+PAR     450.00  380.12 ±0.15  40.00 ±0.10  29.89 ±0.12  0.00 ±0.01
+NIR     360.00  304.10 ±0.12  32.00 ±0.08  23.92 ±0.10  0.00 ±0.01
+standard error of an organ, rms, of the mean: PAR 0.50 %; NIR 0.50 %
+1.23 s, 2.35 s of processor time, at most 300 MiB of memory
+";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn an_isolated_plant_above_a_void() {
+        let mut balance = band("PAR", 1e-4);
+        balance.escaped_down_W = std::mem::take(&mut balance.absorbed_soil_W);
+        let text = shown(None, vec![balance]);
+        let expected = "\
+light in mW, whole scene (± one standard error)
+band  incoming         plants    lost below     reflected       closure
+PAR     90.000  76.025 ±0.030  8.000 ±0.021  5.979 ±0.024  0.000 ±0.002
+standard error of an organ, rms, of the mean: PAR 0.50 %
+1.23 s, 2.35 s of processor time, at most 300 MiB of memory
+";
+        assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn many_bands_with_long_names_fit_into_80_columns() {
+        let bands = (0..12).map(|number| {
+            let mut band = band(&format!("waveband number {number}"), 0.02);
+            band.escaped_down_W = estimate(3.0, 0.5);
+            band
+        });
+        let text = shown(None, bands.collect());
+        assert!(text.contains("waveband nu…"), "{text}");
+        assert!(
+            text.lines().all(|line| line.chars().count() <= COLUMNS),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_dark_scene_is_shown_too() {
+        let text = shown(
+            None,
+            vec![Balance {
+                band: "PAR".into(),
+                ..Balance::default()
+            }],
+        );
+        assert!(text.contains("PAR     0.0000  0.0000 ±0.0000"), "{text}");
+    }
+}

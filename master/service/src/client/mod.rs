@@ -1,0 +1,328 @@
+//! A solve at a master elsewhere: it is handed the scene, watched, and asked for the results, which are
+//! the same to the last bit as if they were computed here.
+//!
+//! A master that is lost is looked for again; one that has forgotten scene or solve (it was started
+//! anew, or had no room) gets them once more. Both end after a time, or after a few rounds.
+
+mod error;
+mod results;
+mod solved;
+mod upload;
+
+use std::time::{Duration, Instant};
+
+use nestrad_common::options::Diameter;
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::{DEFAULT_ACCURACY_PERCENT, Estimator, Settings};
+use nestrad_engine::progress::StageProgress;
+use nestrad_proto::channel::Authorized;
+use nestrad_proto::v1::solve_service_client::SolveServiceClient;
+use nestrad_proto::{MAX_MESSAGE_BYTES, v1};
+use tokio::time::{sleep, timeout};
+use tonic::{Code, Status};
+
+pub use error::RemoteError;
+use results::Arriving;
+pub use solved::SolvedThere;
+
+/// A master that was never reached is given up after this.
+const FIRST_PATIENCE: Duration = Duration::from_secs(10);
+
+/// A master that was reached is given up when it was away for so long.
+const PATIENCE: Duration = Duration::from_secs(60);
+
+/// Pause between two tries.
+const PAUSE: Duration = Duration::from_millis(500);
+
+/// An answer that comes at once, but for the network, comes within this.
+const ANSWER: Duration = Duration::from_secs(60);
+
+/// A master that took the scene, or was about to give the results, so often and then failed will fail
+/// the next time.
+const MOST_ROUNDS: u32 = 8;
+
+/// A master.
+pub type Client = SolveServiceClient<Authorized>;
+
+/// The client service at the other end of a channel.
+pub fn client(channel: Authorized) -> Client {
+    SolveServiceClient::new(channel)
+        .max_decoding_message_size(MAX_MESSAGE_BYTES)
+        .max_encoding_message_size(MAX_MESSAGE_BYTES)
+}
+
+/// What is to be told while a solve goes on.
+#[derive(Clone, Debug)]
+pub enum Event {
+    /// A line of the plan.
+    Plan(String),
+    /// Something that the user may want to know.
+    Note(String),
+    /// How far it is.
+    Stage(StageProgress),
+}
+
+/// Solves at a master, and cancels the solve there when `stop` comes first.
+pub async fn solve(
+    master: Client,
+    scene: Scene,
+    settings: &Settings,
+    mut tell: impl FnMut(Event),
+    stop: impl Future<Output = ()>,
+) -> Result<SolvedThere, RemoteError> {
+    let mut session = Session {
+        master,
+        scene,
+        options: options(settings),
+        geometry_id: None,
+        solve_id: None,
+        heard: None,
+        rounds: 0,
+    };
+    tokio::select! {
+        outcome = session.solve(&mut tell) => outcome,
+        () = stop => {
+            session.cancel().await;
+            Err(RemoteError::Cancelled)
+        }
+    }
+}
+
+fn options(settings: &Settings) -> v1::SolveOptions {
+    let estimator = match settings.estimator {
+        Estimator::Lines => v1::Estimator::Lines,
+        Estimator::Rays => v1::Estimator::Rays,
+    };
+    v1::SolveOptions {
+        diameter_m: match settings.diameter {
+            Diameter::Auto => None,
+            Diameter::Infinite => Some(f64::INFINITY),
+            Diameter::Metres(metres) => Some(metres),
+        },
+        // what is asked for is reached in rounds
+        accuracy_percent: Some(settings.accuracy_percent)
+            .filter(|&a| settings.in_rounds || a != DEFAULT_ACCURACY_PERCENT),
+        memory_gi_b: Some(settings.memory_GiB),
+        seed: Some(settings.seed),
+        estimator: estimator.into(),
+        budget_s: settings.budget_s,
+    }
+}
+
+/// What is known of the solve at the master.
+struct Session {
+    master: Client,
+    scene: Scene,
+    options: v1::SolveOptions,
+    geometry_id: Option<String>,
+    solve_id: Option<String>,
+    /// When the master last answered.
+    heard: Option<Instant>,
+    /// How often it took the scene, or was about to give the results.
+    rounds: u32,
+}
+
+/// Why a try came to nothing.
+enum Setback {
+    /// The master is away: try again.
+    Away(Status),
+    /// The master does not know what it was asked for: tell it again.
+    Forgotten(Status),
+    /// Trying again is of no use.
+    Final(RemoteError),
+}
+
+impl From<RemoteError> for Setback {
+    fn from(error: RemoteError) -> Self {
+        Self::Final(error)
+    }
+}
+
+impl Session {
+    async fn solve(&mut self, tell: &mut impl FnMut(Event)) -> Result<SolvedThere, RemoteError> {
+        let begun = Instant::now();
+        let mut told = false;
+        loop {
+            let status = match self.attempt(tell).await {
+                Ok(solved) => return Ok(solved),
+                Err(Setback::Final(error)) => return Err(error),
+                Err(Setback::Forgotten(status)) => {
+                    self.solve_id = None;
+                    status
+                }
+                Err(Setback::Away(status)) => status,
+            };
+            let message = status.message().to_owned();
+            let (since, patience) = match self.heard {
+                Some(heard) => (heard, PATIENCE),
+                None => (begun, FIRST_PATIENCE),
+            };
+            if since.elapsed() > patience || self.rounds > MOST_ROUNDS {
+                return Err(RemoteError::Lost { message });
+            }
+            if !told {
+                told = true;
+                tell(Event::Note(format!(
+                    "the master is away ({message}): trying again"
+                )));
+            }
+            sleep(PAUSE).await;
+        }
+    }
+
+    async fn attempt(&mut self, tell: &mut impl FnMut(Event)) -> Result<SolvedThere, Setback> {
+        let solve_id = match &self.solve_id {
+            Some(id) => id.clone(),
+            None => {
+                let scene_id = self.upload().await?;
+                self.rounds += 1;
+                let id = self.start(scene_id).await?;
+                self.solve_id.insert(id).clone()
+            }
+        };
+        self.watch(&solve_id, tell).await?;
+        self.rounds += 1;
+        self.fetch(&solve_id).await
+    }
+
+    async fn upload(&mut self) -> Result<String, Setback> {
+        let response = match &self.geometry_id {
+            Some(id) => {
+                let slice = upload::known(&self.scene, id);
+                self.master.upload_scene(tokio_stream::once(slice)).await
+            }
+            None => {
+                let slices = tokio_stream::iter(upload::slices(&self.scene));
+                self.master.upload_scene(slices).await
+            }
+        };
+        match response {
+            Ok(response) => {
+                self.heard = Some(Instant::now());
+                let response = response.into_inner();
+                self.geometry_id = Some(response.geometry_id);
+                Ok(response.scene_id)
+            }
+            Err(status) => {
+                let setback = self.setback("take the scene", status);
+                if matches!(setback, Setback::Forgotten(_)) {
+                    self.geometry_id = None;
+                }
+                Err(setback)
+            }
+        }
+    }
+
+    async fn start(&mut self, scene_id: String) -> Result<String, Setback> {
+        let request = v1::StartSolveRequest {
+            scene_id,
+            options: Some(self.options),
+        };
+        let answer = timeout(ANSWER, self.master.start_solve(request)).await;
+        let response = self.answered("start the solve", answer)?;
+        Ok(response.into_inner().solve_id)
+    }
+
+    /// Until it has finished.
+    async fn watch(&mut self, id: &str, tell: &mut impl FnMut(Event)) -> Result<(), Setback> {
+        let doing = "watch the solve";
+        let request = v1::WatchSolveRequest {
+            solve_id: id.to_owned(),
+        };
+        let answer = timeout(ANSWER, self.master.watch_solve(request)).await;
+        let mut progress = self.answered(doing, answer)?.into_inner();
+        loop {
+            let message = match progress.message().await {
+                Ok(Some(message)) => message,
+                Ok(None) => return Err(Setback::Away(Status::unavailable("the stream ended"))),
+                Err(status) => return Err(self.setback(doing, status)),
+            };
+            self.heard = Some(Instant::now());
+            let state = message.state();
+            for line in message.plan {
+                tell(Event::Plan(line));
+            }
+            match state {
+                v1::SolveState::Finished => return Ok(()),
+                v1::SolveState::Failed => {
+                    let reason = message.reason;
+                    return Err(RemoteError::Failed { reason }.into());
+                }
+                v1::SolveState::Cancelled => return Err(RemoteError::Cancelled.into()),
+                _ => tell(Event::Stage(StageProgress {
+                    name: message.stage,
+                    done: message.done,
+                    total: message.total,
+                })),
+            }
+        }
+    }
+
+    async fn fetch(&mut self, id: &str) -> Result<SolvedThere, Setback> {
+        let doing = "give out the results";
+        let scene = self.scene.clone();
+        let mut arriving = Arriving::new(&scene);
+        for table in [
+            v1::ResultTable::Organs,
+            v1::ResultTable::Triangles,
+            v1::ResultTable::Soil,
+            v1::ResultTable::Summary,
+        ] {
+            let request = v1::FetchResultsRequest {
+                solve_id: id.to_owned(),
+                table: table.into(),
+            };
+            let answer = timeout(ANSWER, self.master.fetch_results(request)).await;
+            let mut slices = self.answered(doing, answer)?.into_inner();
+            while let Some(slice) = slices
+                .message()
+                .await
+                .map_err(|status| self.setback(doing, status))?
+            {
+                self.heard = Some(Instant::now());
+                arriving.take(slice)?;
+            }
+        }
+        Ok(arriving.finish()?)
+    }
+
+    /// Says that the solve is not wanted any more. Whether that arrives makes no difference here.
+    async fn cancel(&mut self) {
+        if let Some(solve_id) = self.solve_id.take() {
+            let request = v1::CancelSolveRequest { solve_id };
+            let _ = timeout(FIRST_PATIENCE, self.master.cancel_solve(request)).await;
+        }
+    }
+
+    fn answered<T>(
+        &mut self,
+        doing: &'static str,
+        answer: Result<Result<T, Status>, tokio::time::error::Elapsed>,
+    ) -> Result<T, Setback> {
+        match answer {
+            Ok(Ok(response)) => {
+                self.heard = Some(Instant::now());
+                Ok(response)
+            }
+            Ok(Err(status)) => Err(self.setback(doing, status)),
+            Err(_) => Err(Setback::Away(Status::unavailable("no answer"))),
+        }
+    }
+
+    fn setback(&mut self, doing: &'static str, status: Status) -> Setback {
+        match status.code() {
+            // what the transport says of a connection that broke
+            Code::Unavailable | Code::Unknown | Code::Cancelled | Code::Internal => {
+                Setback::Away(status)
+            }
+            Code::NotFound => {
+                self.heard = Some(Instant::now());
+                Setback::Forgotten(status)
+            }
+            _ => Setback::Final(RemoteError::Refused {
+                doing,
+                message: status.message().to_owned(),
+            }),
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! The threads that solve: never those of tokio.
+
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+use nestrad_cluster::store::Store;
+use nestrad_cluster::{Cluster, with_rows};
+use nestrad_engine::causes::causes;
+use nestrad_engine::heap::Freed;
+use nestrad_engine::plan::Plan;
+use nestrad_engine::rounds::{Round, RoundsError, solve_in_rounds};
+use nestrad_engine::run::Run;
+use nestrad_engine::stopwatch::Stopwatch;
+use nestrad_engine::traced::SolveError;
+use rayon::ThreadPool;
+use thiserror::Error;
+
+use super::metrics::Metrics;
+use super::scenes::HeldScene;
+use super::solution::HeldSolution;
+use super::solves::{Phase, Solve, Solves};
+
+/// What a master computes with.
+pub(super) struct Means<'a> {
+    pub(super) pool: &'a ThreadPool,
+    /// Those that may come: a master without workers computes by itself.
+    pub(super) workers: &'a Cluster,
+    pub(super) kept: Option<&'a Store>,
+}
+
+/// Solves what is in the queue, one solve after the other, until the master stops.
+pub(super) fn work(solves: &Solves, means: &Means, metrics: &Metrics) {
+    let mut freed = Freed::default();
+    while let Some(solve) = solves.next() {
+        let span = tracing::info_span!("solve", id = %solve.id);
+        let _entered = span.enter();
+        tracing::info!(triangles = solve.triangles, bands = solve.bands, "begins");
+        // a fault of the program ends the solve, not the master
+        let ended = catch_unwind(AssertUnwindSafe(|| {
+            means.pool.install(|| end_of(&solve, means, metrics))
+        }));
+        let phase = ended.unwrap_or_else(|_| Phase::Failed("internal fault".to_owned()));
+        match &phase {
+            Phase::Finished(solution) => {
+                tracing::info!(wall_s = solution.summary.wall_s, "finished");
+            }
+            Phase::Failed(reason) => tracing::warn!(reason, "failed"),
+            _ => tracing::info!("cancelled"),
+        }
+        metrics.ended(&phase);
+        solves.ended(&solve, phase);
+        freed.give_back();
+    }
+}
+
+/// Computes a solve, and says how it ended.
+fn end_of(solve: &Solve, means: &Means, metrics: &Metrics) -> Phase {
+    let Some(scene) = solve.take_scene() else {
+        return Phase::Cancelled;
+    };
+    match solution(solve, means, &scene) {
+        Ok(solution) => {
+            metrics.solved(&solution.summary);
+            Phase::Finished(Arc::new(solution))
+        }
+        Err(Fault::Rounds(RoundsError::Solve(SolveError::Stopped(_)))) => Phase::Cancelled,
+        Err(fault) => Phase::Failed(causes(&fault)),
+    }
+}
+
+/// Why a solve has no result.
+#[derive(Debug, Error)]
+enum Fault {
+    #[error(transparent)]
+    Rounds(#[from] RoundsError),
+    #[error("the plan cannot be written down")]
+    Json(#[from] serde_json::Error),
+}
+
+fn solution(solve: &Solve, means: &Means, held: &HeldScene) -> Result<HeldSolution, Fault> {
+    let mut watch = Stopwatch::start();
+    solve.progress.stage("plan", 0);
+    let run = Run {
+        stop: &solve.stop,
+        progress: &solve.progress,
+    };
+    let begins = |plan: &Plan, _: &[Round]| solve.set_plan(&plan.reasons);
+    let workers = means.workers.has_workers().then_some(means.workers);
+    let scene = held.scene();
+    let solved = with_rows(workers, means.kept, |rows| {
+        solve_in_rounds(&scene, &solve.settings, rows, &run, &mut watch, begins)
+    })?;
+    let usage = watch.usage();
+    Ok(HeldSolution::new(held, solved, watch.stages(), usage)?)
+}

@@ -1,0 +1,391 @@
+//! What is taken in, and what is refused.
+
+mod random;
+
+use nestrad_common::options::Diameter;
+use nestrad_common::scene::Scene;
+use nestrad_proto::v1;
+use nestrad_proto::v1::scene_material::Kind;
+
+use super::*;
+use nestrad_engine::plan::Estimator;
+
+fn header() -> v1::GeometryHeader {
+    let material = |name: &str, kind: Kind| v1::SceneMaterial {
+        name: name.to_owned(),
+        kind: kind.into(),
+    };
+    v1::GeometryHeader {
+        triangles: 2,
+        organs: 2,
+        materials: vec![material("leaf", Kind::Leaf), material("stem", Kind::Stem)],
+        pattern: Some(v1::PatternRectangle {
+            min_x_m: 10.0,
+            min_y_m: 20.0,
+            max_x_m: 11.0,
+            max_y_m: 22.0,
+        }),
+        soil_z_m: Some(-0.5),
+    }
+}
+
+fn organs() -> v1::OrganSlice {
+    v1::OrganSlice {
+        first: 0,
+        id: vec!["a".into(), "b".into()],
+        plant: vec!["1".into(), "1".into()],
+    }
+}
+
+fn triangles() -> v1::TriangleSlice {
+    let one = [10.5, 20.5, 0.0, 10.7, 20.5, 0.1, 10.5, 20.7, 0.2];
+    v1::TriangleSlice {
+        first: 0,
+        vertices_m: [one, one.map(|x| x + 0.25)].concat(),
+        organ: vec![0, 1],
+        material: vec![0, 1],
+    }
+}
+
+fn received(
+    header: &v1::GeometryHeader,
+    organs: v1::OrganSlice,
+    triangles: &v1::TriangleSlice,
+) -> Result<HeldGeometry, ServiceError> {
+    let mut upload = Upload::begin(header)?;
+    upload.triangles(triangles)?;
+    upload.organs(organs)?;
+    upload.finish()
+}
+
+fn refusal<T>(result: Result<T, ServiceError>) -> String {
+    let error = result.err().unwrap();
+    assert_eq!(error.code, ErrorCode::Invalid);
+    error.message
+}
+
+#[test]
+fn a_scene_moves_to_its_local_origin_as_files_do() {
+    let held = received(&header(), organs(), &triangles()).unwrap();
+    let scene = &held.scene;
+    assert_eq!(scene.origin_m, DVec3::new(10.0, 20.0, 0.0));
+    assert_eq!(scene.triangles[0][1], DVec3::new(10.7 - 10.0, 0.5, 0.1));
+    assert_eq!(scene.soil_z_m, Some(-0.5));
+    assert_eq!(scene.materials[1], Material::Stem { species: 2 });
+    assert_eq!((scene.organ[1], scene.material[1]), (1, 1));
+    assert_eq!(held.inspection.plants, 1);
+}
+
+#[test]
+fn a_scene_at_its_local_origin_stays_there_bit_for_bit() {
+    let first = received(&header(), organs(), &triangles()).unwrap().scene;
+    let again = v1::TriangleSlice {
+        vertices_m: first
+            .triangles
+            .iter()
+            .flatten()
+            .flat_map(|v| v.to_array())
+            .collect(),
+        ..triangles()
+    };
+    let header = v1::GeometryHeader {
+        pattern: Some(v1::PatternRectangle {
+            min_x_m: 0.0,
+            min_y_m: 0.0,
+            max_x_m: 1.0,
+            max_y_m: 2.0,
+        }),
+        ..header()
+    };
+    let second = received(&header, organs(), &again).unwrap().scene;
+    let origin_m = first.origin_m;
+    assert_eq!(Scene { origin_m, ..second }, first);
+}
+
+#[test]
+fn the_same_content_has_the_same_name_however_it_is_cut() {
+    let whole = received(&header(), organs(), &triangles()).unwrap().id;
+    let mut upload = Upload::begin(&header()).unwrap();
+    upload.organs(organs()).unwrap();
+    let all = triangles();
+    for k in 0..2 {
+        let slice = v1::TriangleSlice {
+            first: k as u64,
+            vertices_m: all.vertices_m[9 * k..9 * k + 9].to_vec(),
+            organ: vec![all.organ[k]],
+            material: vec![all.material[k]],
+        };
+        upload.triangles(&slice).unwrap();
+    }
+    assert_eq!(upload.finish().unwrap().id, whole);
+    let mut other = triangles();
+    other.vertices_m[3] += 1e-9;
+    assert_ne!(received(&header(), organs(), &other).unwrap().id, whole);
+    let other = v1::GeometryHeader {
+        soil_z_m: None,
+        ..header()
+    };
+    assert_ne!(received(&other, organs(), &triangles()).unwrap().id, whole);
+}
+
+#[test]
+fn headers_that_cannot_be_are_refused() {
+    let with = |change: fn(&mut v1::GeometryHeader)| {
+        let mut header = header();
+        change(&mut header);
+        refusal(received(&header, organs(), &triangles()))
+    };
+    for (message, said) in [
+        (
+            with(|h| h.triangles = 0),
+            "new_geometry.triangles: expected 1 to",
+        ),
+        (
+            with(|h| h.triangles = u64::MAX),
+            "found 18446744073709551615",
+        ),
+        (with(|h| h.organs = 0), "new_geometry.organs"),
+        (
+            with(|h| h.organs = 3),
+            "expected 3 organs, as announced, found 2",
+        ),
+        (
+            with(|h| h.materials.clear()),
+            "materials: expected 1 to 4096, found 0",
+        ),
+        (with(|h| h.materials[1].name.clear()), "materials[1].name"),
+        (
+            with(|h| h.materials[1].name = "leaf".into()),
+            "found 'leaf' again",
+        ),
+        (
+            with(|h| h.materials[0].kind = 9),
+            "materials[0].kind: expected leaf, stem or soil",
+        ),
+        (
+            with(|h| h.materials.iter_mut().for_each(|m| m.kind = 2)),
+            "expected one soil",
+        ),
+        (with(|h| h.soil_z_m = Some(f64::NAN)), "soil height"),
+        (
+            with(|h| h.pattern.as_mut().unwrap().max_x_m = 10.0),
+            "pattern: expected",
+        ),
+        (
+            with(|h| h.pattern.as_mut().unwrap().max_x_m = f64::INFINITY),
+            "pattern",
+        ),
+    ] {
+        assert!(message.contains(said), "{said}: {message}");
+    }
+}
+
+#[test]
+fn slices_that_cannot_be_are_refused() {
+    let with = |change: fn(&mut v1::TriangleSlice, &mut v1::OrganSlice)| {
+        let (mut triangles, mut organs) = (triangles(), organs());
+        change(&mut triangles, &mut organs);
+        refusal(received(&header(), organs, &triangles))
+    };
+    for (message, said) in [
+        (
+            with(|t, _| t.first = 1),
+            "triangles: first: expected 0, found 1",
+        ),
+        (
+            with(|t, _| t.vertices_m[10] = f64::NAN),
+            "triangles[1].vertices_m: y of vertex 1: expected a finite number",
+        ),
+        (
+            with(|t, _| t.vertices_m[17] = 2e12),
+            "triangles[1].vertices_m: z of vertex 3",
+        ),
+        (
+            with(|t, _| t.vertices_m.truncate(17)),
+            "expected 18 numbers for 2 triangles, found 17",
+        ),
+        (
+            with(|t, _| t.organ[1] = 2),
+            "triangles[1].organ: expected a number below 2, found 2",
+        ),
+        (with(|t, _| t.material[0] = 7), "triangles[0].material"),
+        (
+            with(|t, _| t.material.push(0)),
+            "material: expected 2, found 3",
+        ),
+        (
+            with(|t, _| {
+                *t = v1::TriangleSlice {
+                    vertices_m: [&t.vertices_m[..], &t.vertices_m[..9]].concat(),
+                    organ: vec![0; 3],
+                    material: vec![0; 3],
+                    first: 0,
+                };
+            }),
+            "triangles: expected 2, as announced, found 3",
+        ),
+        (
+            with(|_, o| o.id[1] = "a".into()),
+            "organs[1]: expected an organ of its own",
+        ),
+        (with(|_, o| o.id[1].clear()), "organs[1].id"),
+        (
+            with(|_, o| o.plant[0] = "x".repeat(5000)),
+            "organs[0].plant: expected 1 to 4096 bytes",
+        ),
+        (
+            with(|_, o| o.plant.truncate(1)),
+            "plant: expected 2, found 1",
+        ),
+    ] {
+        assert!(message.contains(said), "{said}: {message}");
+    }
+}
+
+fn band(name: &str) -> v1::BandOptics {
+    let optics = v1::MaterialOptics {
+        rho_upper: 0.4,
+        tau_upper: 0.0,
+        rho_lower: 0.3,
+        tau_lower: 0.0,
+    };
+    v1::BandOptics {
+        name: name.to_owned(),
+        soil_albedo: 0.2,
+        materials: vec![optics; 2],
+    }
+}
+
+fn sun() -> v1::ParallelSource {
+    v1::ParallelSource {
+        direction_x: 3.0,
+        direction_y: 0.0,
+        direction_z: -4.0,
+        irradiance_w_m2: vec![100.0],
+    }
+}
+
+const MATERIALS: [Material; 2] = [Material::Leaf { species: 1 }, Material::Stem { species: 2 }];
+
+#[test]
+fn directions_become_unit_vectors_once() {
+    let first = light(&[band("PAR")], (&[sun()], 0), &MATERIALS).unwrap();
+    let direction = first.sources[0].direction;
+    assert!(direction.abs_diff_eq(DVec3::new(0.6, 0.0, -0.8), 1e-15));
+    for k in 0..1000 {
+        let turned = DVec3::new(0.1 + 1e-3 * f64::from(k), 0.3, -0.7).normalize();
+        let given = v1::ParallelSource {
+            direction_x: turned.x,
+            direction_y: turned.y,
+            direction_z: turned.z,
+            ..sun()
+        };
+        let light = light(&[band("PAR")], (&[given], 0), &MATERIALS).unwrap();
+        assert_eq!(light.sources[0].direction, turned);
+    }
+}
+
+#[test]
+fn light_that_cannot_be_is_refused() {
+    let with = |change: fn(&mut Vec<v1::BandOptics>, &mut v1::ParallelSource)| {
+        let (mut bands, mut source) = (vec![band("PAR")], sun());
+        change(&mut bands, &mut source);
+        refusal(light(&bands, (&[source], 0), &MATERIALS))
+    };
+    for (message, said) in [
+        (with(|b, _| b.clear()), "bands: expected 1 to 256, found 0"),
+        (
+            with(|b, _| b.push(band("PAR"))),
+            "bands[1].name: expected a name of its own",
+        ),
+        (with(|b, _| b[0].name.clear()), "bands[0].name"),
+        (
+            with(|b, _| b[0].soil_albedo = 1.1),
+            "bands[0].soil_albedo: expected 0 to 1",
+        ),
+        (with(|b, _| b[0].soil_albedo = f64::NAN), "found NaN"),
+        (
+            with(|b, _| b[0].materials.truncate(1)),
+            "expected 2, one per material, found 1",
+        ),
+        (
+            with(|b, _| b[0].materials[0].tau_upper = 0.61),
+            "bands[0].materials[0]: expected finite numbers of at least 0 with rho + tau <= 1, \
+             found rho = 0.4 and tau = 0.61",
+        ),
+        (
+            with(|b, _| b[0].materials[0].rho_lower = -0.1),
+            "rho = -0.1",
+        ),
+        (
+            with(|b, _| b[0].materials[1].tau_lower = 0.1),
+            "tau = 0 of stem and soil",
+        ),
+        (
+            with(|_, s| s.irradiance_w_m2.clear()),
+            "sources[0].irradiance_W_m2: expected 1",
+        ),
+        (
+            with(|_, s| s.irradiance_w_m2[0] = -1.0),
+            "sources[0].irradiance_W_m2[0]",
+        ),
+        (
+            with(|_, s| s.irradiance_w_m2[0] = f64::INFINITY),
+            "found inf",
+        ),
+        (
+            with(|_, s| s.direction_z = 4.0),
+            "sources[0]: direction: expected",
+        ),
+        (with(|_, s| s.direction_z = f64::NAN), "points down"),
+        (with(|_, s| s.direction_z = -1e-9), "points down"),
+    ] {
+        assert!(message.contains(said), "{said}: {message}");
+    }
+}
+
+#[test]
+fn options_have_the_defaults_of_the_command_line() {
+    let of = |given: v1::SolveOptions| settings(&given, 8.0);
+    assert_eq!(
+        of(v1::SolveOptions::default()),
+        Ok(crate::plan::Settings::default())
+    );
+    let given = of(v1::SolveOptions {
+        diameter_m: Some(f64::INFINITY),
+        budget_s: Some(60.0),
+        accuracy_percent: Some(1.0),
+        memory_gi_b: Some(2.0),
+        seed: Some(0),
+        estimator: v1::Estimator::Rays.into(),
+    })
+    .unwrap();
+    assert_eq!((given.diameter, given.seed), (Diameter::Infinite, 0));
+    assert_eq!(given.estimator, Estimator::Rays);
+    let with = |change: fn(&mut v1::SolveOptions)| {
+        let mut options = v1::SolveOptions::default();
+        change(&mut options);
+        refusal(of(options))
+    };
+    for (message, said) in [
+        (with(|o| o.diameter_m = Some(0.0)), "options.diameter_m"),
+        (
+            with(|o| o.diameter_m = Some(f64::NEG_INFINITY)),
+            "options.diameter_m",
+        ),
+        (
+            with(|o| o.accuracy_percent = Some(f64::NAN)),
+            "options.accuracy_percent",
+        ),
+        (
+            with(|o| o.memory_gi_b = Some(9.0)),
+            "options.memory_GiB: expected at most 8",
+        ),
+        (
+            with(|o| o.estimator = 7),
+            "options.estimator: expected lines or rays",
+        ),
+    ] {
+        assert!(message.contains(said), "{said}: {message}");
+    }
+}

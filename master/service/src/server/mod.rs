@@ -1,0 +1,26 @@
+//! The master as a service: it keeps scenes and solves, computes one solve after the other, and gives
+//! out what came of them, over gRPC.
+//!
+//! Calls are answered on tokio's threads; what takes time is done on threads of its own and rayon's.
+//! Everything that a caller chooses the size of is bounded: see [`ServiceLimits`].
+
+mod budget;
+mod compute;
+mod connection;
+mod error;
+mod held;
+mod identity;
+mod intake;
+mod limits;
+mod metrics;
+mod rpc;
+mod scenes;
+mod server;
+mod slices;
+mod solution;
+mod solves;
+
+pub use error::{ErrorCode, ServiceError};
+pub use limits::ServiceLimits;
+pub use metrics::Metrics;
+pub use server::{ServeError, Service, serve_metrics};

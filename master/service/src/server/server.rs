@@ -1,0 +1,224 @@
+//! The service on a socket: its health, what it can do, and how it stops.
+
+use std::io;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+use axum::Router;
+use axum::http::header::CONTENT_TYPE;
+use axum::routing::get;
+use nestrad_cluster::store::Store;
+use nestrad_cluster::{Cluster, WorkerLimits, worker_service};
+use nestrad_proto::access::{Access, AccessError};
+use nestrad_proto::v1::solve_service_server::SolveServiceServer;
+use nestrad_proto::{DESCRIPTORS, MAX_MESSAGE_BYTES};
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
+use thiserror::Error;
+use tokio::net::TcpListener;
+use tokio::sync::Semaphore;
+use tokio::time::{sleep, timeout};
+use tonic_health::server::HealthReporter;
+
+use super::limits::ServiceLimits;
+use super::compute::{self, Means};
+use super::connection::incoming;
+use super::metrics::{Metrics, Now};
+use super::rpc::{Rpc, UPLOADS};
+use super::scenes::Scenes;
+use super::solves::{Solves, Phase};
+
+
+/// Time for clients to come for what has just finished, and to hang up, when the master stops.
+const FAREWELL: Duration = Duration::from_secs(5);
+
+/// A master that serves clients.
+#[derive(Clone, Debug)]
+pub struct Service {
+    limits: ServiceLimits,
+    scenes: Arc<Scenes>,
+    solves: Arc<Solves>,
+    metrics: Arc<Metrics>,
+    pool: Arc<ThreadPool>,
+    workers: Cluster,
+    kept: Option<Store>,
+    started: Instant,
+}
+
+/// Why a master does not serve.
+#[derive(Debug, Error)]
+pub enum ServeError {
+    /// It may not listen there, or has no credentials.
+    #[error(transparent)]
+    Access(#[from] AccessError),
+    /// Threads cannot be started.
+    #[error("cannot start threads")]
+    Threads(#[from] ThreadPoolBuildError),
+    /// The system refused.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+    /// The description of the services is broken.
+    #[error("cannot describe the services")]
+    Reflection(#[from] tonic_reflection::server::Error),
+    /// The server failed.
+    #[error("cannot serve")]
+    Transport(#[from] tonic::transport::Error),
+}
+
+impl Service {
+    /// A master that computes with so many threads, 0 for one per processor, as long as there are no
+    /// workers. To be called within a tokio runtime.
+    pub fn new(
+        limits: ServiceLimits,
+        workers: WorkerLimits,
+        kept: Option<Store>,
+        threads: usize,
+    ) -> Result<Self, ServeError> {
+        let named = |k| format!("compute-{k}");
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .thread_name(named)
+            .build()?;
+        Ok(Self {
+            limits,
+            scenes: Arc::new(Scenes::new(limits.scene_bytes)),
+            solves: Arc::new(Solves::new(limits.queue, limits.result_bytes)),
+            metrics: Arc::default(),
+            pool: Arc::new(pool),
+            workers: Cluster::start(workers, threads)?,
+            kept,
+            started: Instant::now(),
+        })
+    }
+
+    /// Serves until `shutdown` comes, and then until what is being computed is done and fetched, or the
+    /// time for that is over.
+    pub async fn run(
+        &self,
+        listener: TcpListener,
+        access: &Access,
+        shutdown: impl Future<Output = ()> + Send + 'static,
+    ) -> Result<(), ServeError> {
+        let mut server = access.server(listener.local_addr()?)?;
+        let reflection = || {
+            tonic_reflection::server::Builder::configure()
+                .register_encoded_file_descriptor_set(DESCRIPTORS)
+                .register_encoded_file_descriptor_set(tonic_health::pb::FILE_DESCRIPTOR_SET)
+        };
+        let (health, health_service) = tonic_health::server::health_reporter();
+        health.set_serving::<SolveServiceServer<Rpc>>().await;
+        self.start_computing()?;
+        let rpc = Rpc {
+            scenes: self.scenes.clone(),
+            solves: self.solves.clone(),
+            metrics: self.metrics.clone(),
+            uploads: Semaphore::new(UPLOADS),
+            workers: self.workers.clone(),
+            most_GiB: self.limits.solve_GiB,
+            started: self.started,
+        };
+        let clients = SolveServiceServer::new(rpc)
+            .max_decoding_message_size(MAX_MESSAGE_BYTES)
+            .max_encoding_message_size(MAX_MESSAGE_BYTES);
+        let drained = Arc::new(tokio::sync::Notify::new());
+        let (this, told) = (self.clone(), drained.clone());
+        let drain = async move {
+            shutdown.await;
+            this.drain(&health).await;
+            told.notify_one();
+        };
+        let serving = server
+            .add_service(health_service)
+            .add_service(reflection().build_v1()?)
+            .add_service(reflection().build_v1alpha()?)
+            .add_service(clients)
+            .add_service(worker_service(self.workers.clone()))
+            .serve_with_incoming_shutdown(incoming(listener, self.metrics.clone()), drain);
+        // who does not hang up is left behind
+        let patience = async {
+            drained.notified().await;
+            sleep(FAREWELL).await;
+        };
+        tokio::select! {
+            served = serving => served?,
+            () = patience => {}
+        }
+        Ok(())
+    }
+
+    fn start_computing(&self) -> io::Result<()> {
+        for k in 0..self.limits.solves.max(1) {
+            let this = self.clone();
+            std::thread::Builder::new()
+                .name(format!("solve-{k}"))
+                .spawn(move || this.compute())?;
+        }
+        Ok(())
+    }
+
+    /// Solves one after the other, until the master stops.
+    fn compute(&self) {
+        let means = Means {
+            pool: &self.pool,
+            workers: &self.workers,
+            kept: self.kept.as_ref(),
+        };
+        compute::work(&self.solves, &means, &self.metrics);
+    }
+
+    /// Takes on nothing new, and waits for the rest.
+    async fn drain(&self, health: &HealthReporter) {
+        tracing::info!("stops: nothing new is taken on");
+        health.set_not_serving::<SolveServiceServer<Rpc>>().await;
+        let overall = tonic_health::ServingStatus::NotServing;
+        health.set_service_status("", overall).await;
+        self.solves.stop();
+        let limit = Duration::from_secs(self.limits.drain_s);
+        if timeout(limit, until(|| self.solves.is_idle()))
+            .await
+            .is_err()
+        {
+            tracing::warn!("solves are cancelled: the time to drain is over");
+            for solve in self.solves.all() {
+                self.solves.cancel(&solve);
+            }
+        }
+        self.workers.close();
+        if let Some(kept) = &self.kept {
+            kept.close();
+        }
+        // results that nobody comes for are lost
+        let quiet = until(|| self.solves.is_quiet(FAREWELL));
+        let _ = timeout(limit + FAREWELL, quiet).await;
+    }
+
+    fn metrics_text(&self) -> String {
+        let solves = self.solves.all();
+        let count = |of: fn(&Phase) -> bool| solves.iter().filter(|solve| of(&solve.phase())).count();
+        self.metrics.text(&Now {
+            queued: count(|state| matches!(state, Phase::Queued)),
+            running: count(|state| matches!(state, Phase::Running)),
+            ended: count(Phase::has_ended),
+            scenes: self.scenes.count(),
+            scene_bytes: self.scenes.bytes(),
+            result_bytes: self.solves.result_bytes(),
+            workers: self.workers.status(),
+        })
+    }
+}
+
+/// Polled: a master stops once.
+async fn until(done: impl Fn() -> bool) {
+    while !done() {
+        sleep(Duration::from_millis(50)).await;
+    }
+}
+
+/// Serves the metrics of a master as Prometheus reads them, at `/metrics`.
+pub async fn serve_metrics(listener: TcpListener, service: Service) -> io::Result<()> {
+    const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+    let answer = move || {
+        let text = service.metrics_text();
+        async move { ([(CONTENT_TYPE, OPEN_METRICS)], text) }
+    };
+    axum::serve(listener, Router::new().route("/metrics", get(answer))).await
+}

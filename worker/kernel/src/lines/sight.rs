@@ -1,0 +1,191 @@
+//! Who sees whom along a line.
+
+use super::burial::bury;
+use super::fragments::Hit;
+use crate::block::Block;
+use crate::far_grid::{Exit, Passage};
+use crate::lattice::{DEPTH_OF_TOP, Lattice};
+use crate::rows::Pair;
+use crate::soil::SoilGrid;
+
+/// Turns the sorted hits of a line into pairs that see each other.
+pub(crate) struct Sight<'a> {
+    block: &'a Block,
+    lattice: &'a Lattice,
+    soil: Option<SoilUnder>,
+    sky: u32,
+    below: u32,
+    /// The sphere's radius in depth steps; `None` when nothing is ever that far away.
+    radius: Option<u32>,
+}
+
+impl<'a> Sight<'a> {
+    pub(crate) fn new(block: &'a Block, lattice: &'a Lattice) -> Self {
+        let ends = &block.ends;
+        let steps = (block.radius_m / lattice.distance_m(1)).ceil();
+        Self {
+            block,
+            lattice,
+            soil: block.soil.map(|soil| SoilUnder::new(&soil, lattice)),
+            sky: block.local(ends.sky()),
+            below: block.local(if block.soil.is_some() {
+                ends.outer_soil()
+            } else {
+                ends.void()
+            }),
+            radius: (steps < f64::from(u32::MAX)).then_some(steps as u32),
+        }
+    }
+
+    /// Adds the pairs along one line; `hits` by rising depth.
+    pub(crate) fn along(&self, line: usize, hits: &[Hit], pairs: &mut Vec<Pair>) {
+        let start = pairs.len();
+        let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
+        let (under, hits) = hits.split_at(hits.partition_point(|h| h.depth() < soil_depth));
+        self.neighbours(line, hits, soil_depth, pairs);
+        if hits.iter().any(|h| self.block.is_solid(h.face_along())) {
+            bury(self.block, hits, self.radius, pairs, start);
+        }
+        // what lies under the soil gets no light and is not seen; how much that is of what the soil cuts is known
+        let buried = self.block.local(self.block.ends.buried());
+        for hit in under {
+            if self.block.is_cut_by_soil(hit.face_along()) {
+                continue;
+            }
+            pairs.push((hit.face_against(), buried));
+            pairs.push((hit.face_along(), buried));
+        }
+    }
+
+    fn neighbours(&self, line: usize, hits: &[Hit], soil_depth: u32, pairs: &mut Vec<Pair>) {
+        let bottom = self.bottom(line);
+        let Some(radius) = self.radius else {
+            let mut seen = bottom;
+            for hit in hits {
+                pairs.push((seen, hit.face_against()));
+                seen = hit.face_along();
+            }
+            pairs.push((seen, self.sky));
+            return;
+        };
+
+        let (mut seen, mut depth) = (bottom, soil_depth);
+        for hit in hits {
+            if hit.depth().saturating_sub(depth) <= radius {
+                pairs.push((seen, hit.face_against()));
+            } else {
+                pairs.push((seen, self.far_above(line, depth, radius)));
+                pairs.push((
+                    hit.face_against(),
+                    self.far_below(line, hit.depth(), radius),
+                ));
+            }
+            (seen, depth) = (hit.face_along(), hit.depth());
+        }
+        pairs.push((seen, self.far_above(line, depth, radius)));
+    }
+
+    /// Adds what stands, along one line, at the other end of each look into the far field: (far end, what
+    /// is there), and what leaves at the line's ends.
+    ///
+    /// So the far field is the mean over just those lines of sight that are longer than the sphere reaches,
+    /// and what one end of them sends out is what the others get.
+    pub(crate) fn beyond(&self, line: usize, hits: &[Hit], looks: &mut Vec<Pair>) {
+        let soil_depth = self.soil.as_ref().map_or(0, |soil| soil.depth);
+        let hits = &hits[hits.partition_point(|h| h.depth() < soil_depth)..];
+        let bottom = self.bottom(line);
+        let first = self.block.local(self.block.ends.far(0));
+        let leaving = |exit: Exit| first + exit.row(self.block.ends.far_ends);
+        let at_top = hits.last().map_or(bottom, |h| h.face_along());
+        let at_bottom = hits.first().map_or(self.sky, |h| h.face_against());
+        looks.push((leaving(Exit::Up), at_top));
+        looks.push((leaving(Exit::Down), at_bottom));
+        let Some(radius) = self.radius else { return };
+        let (mut seen, mut depth) = (bottom, soil_depth);
+        for hit in hits {
+            if hit.depth().saturating_sub(depth) > radius {
+                if seen != self.below {
+                    looks.push((self.far_above(line, depth, radius), hit.face_against()));
+                }
+                looks.push((self.far_below(line, hit.depth(), radius), seen));
+            }
+            (seen, depth) = (hit.face_along(), hit.depth());
+        }
+        let above = self.far_above(line, depth, radius);
+        if above != self.sky && seen != self.below {
+            looks.push((above, self.sky));
+        }
+    }
+
+    /// What is at the lower end of a line.
+    fn bottom(&self, line: usize) -> u32 {
+        let cell = self.soil.as_ref().and_then(|soil| soil.cell(line));
+        cell.map_or(self.below, |c| self.block.local(self.block.ends.soil(c)))
+    }
+
+    /// What is seen upwards, where nothing is hit within the sphere.
+    fn far_above(&self, line: usize, depth: u32, radius: u32) -> u32 {
+        match depth.checked_add(radius) {
+            Some(at) if at < DEPTH_OF_TOP => self.far(line, at, self.lattice.direction.z),
+            _ => self.sky,
+        }
+    }
+
+    /// What is seen downwards, where nothing is hit within the sphere.
+    fn far_below(&self, line: usize, depth: u32, radius: u32) -> u32 {
+        let at = depth.saturating_sub(radius);
+        self.far(line, at, -self.lattice.direction.z)
+    }
+
+    /// The far end that stands for what is seen along a line past a depth; random by line and depth.
+    fn far(&self, line: usize, depth: u32, direction_z: f64) -> u32 {
+        let Some(grid) = &self.block.far else {
+            return if direction_z < 0.0 { self.below } else { self.sky };
+        };
+        let hash = ((line as u64) << 32 | u64::from(depth)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let nx = self.lattice.nx as usize;
+        let end = grid.end_at(&Passage {
+            height: f64::from(depth) / f64::from(DEPTH_OF_TOP),
+            at_m: &|| {
+                let (i, j) = ((line % nx) as f64, (line / nx) as f64);
+                let z_m = self.lattice.height_m(depth);
+                self.lattice.point_at(i, j, z_m).truncate()
+            },
+            direction_z,
+            random: (hash >> 11) as f64 / (1u64 << 53) as f64,
+        });
+        self.block.local(self.block.ends.far(end))
+    }
+}
+
+/// The soil cells at the lower ends of the lines.
+struct SoilUnder {
+    depth: u32,
+    /// Column and row of cells for each column and row of the lattice; `None` beyond the map.
+    column: Vec<Option<u32>>,
+    row: Vec<Option<u32>>,
+    columns: u32,
+}
+
+impl SoilUnder {
+    fn new(soil: &SoilGrid, lattice: &Lattice) -> Self {
+        let place = |i: u32, j: u32| lattice.point_at(f64::from(i), f64::from(j), soil.z_m);
+        let periodic = lattice.periodic;
+        Self {
+            depth: lattice.depth_of_height(soil.z_m),
+            column: (0..lattice.nx)
+                .map(|i| soil.along(0, place(i, 0).x, periodic))
+                .collect(),
+            row: (0..lattice.ny)
+                .map(|j| soil.along(1, place(0, j).y, periodic))
+                .collect(),
+            columns: soil.cells[0],
+        }
+    }
+
+    /// The cell at the lower end of a line.
+    fn cell(&self, line: usize) -> Option<u32> {
+        let nx = self.column.len();
+        Some(self.row[line / nx]? * self.columns + self.column[line % nx]?)
+    }
+}
