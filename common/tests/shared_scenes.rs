@@ -7,8 +7,8 @@ use std::fs;
 use std::path::PathBuf;
 
 use nestrad_common::assemble::{Loaded, load};
-use nestrad_common::geometry::area;
 use nestrad_common::formats::{can, read};
+use nestrad_common::geometry::area;
 use nestrad_common::inputs::{BandInput, Inputs, LightInput, PatternInput};
 
 /// The folder of sample scenes, if this machine has it.

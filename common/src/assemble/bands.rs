@@ -4,9 +4,9 @@ use std::collections::BTreeMap;
 
 use super::{LoadError, name};
 use crate::canopy::{Canopy, Material};
-use crate::formats::{Origins, Place};
 use crate::formats::opt::{Opt, parse};
 use crate::formats::read::{MAX_SMALL_BYTES, read};
+use crate::formats::{Origins, Place};
 use crate::inputs::BandInput;
 use crate::optics::{Band, LeafOptics};
 

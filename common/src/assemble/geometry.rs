@@ -104,10 +104,7 @@ impl Joined {
         let organs: Vec<u32> = organs.into_iter().map(organ).collect();
         let material = |m| numbered(&mut self.material_numbers, &mut self.materials, m);
         let materials: Vec<u32> = materials.into_iter().map(material).collect();
-        for (numbers, of) in [
-            (&organs, &mut mesh.organ),
-            (&materials, &mut mesh.material),
-        ] {
+        for (numbers, of) in [(&organs, &mut mesh.organ), (&materials, &mut mesh.material)] {
             of.iter_mut().for_each(|n| *n = numbers[*n as usize]);
         }
         self.origins.extend(file, self.triangles, line);

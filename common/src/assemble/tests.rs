@@ -6,10 +6,10 @@ use std::path::PathBuf;
 use tempfile::TempDir;
 
 use super::*;
+use crate::canopy::Material;
 use crate::inputs::BandInput;
 use crate::light::Sky;
 use crate::options::Unit;
-use crate::canopy::Material;
 
 const LEAF: &str = "p 1 100001001001 3 0 0 1 1 0 1 0 1 1\n";
 
@@ -91,7 +91,12 @@ fn fault_results_do_not_depend_on_the_unit_of_length() {
     };
     let metres = scene(Unit::Metre);
     for other in [scene(Unit::Centimetre), scene(Unit::Millimetre)] {
-        for (a, b) in metres.triangle(0).corners_m.iter().zip(&other.triangle(0).corners_m) {
+        for (a, b) in metres
+            .triangle(0)
+            .corners_m
+            .iter()
+            .zip(&other.triangle(0).corners_m)
+        {
             assert!(a.abs_diff_eq(*b, 1e-15));
         }
         let (a, b) = (metres.pattern.unwrap(), other.pattern.unwrap());

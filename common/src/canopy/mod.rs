@@ -93,7 +93,9 @@ impl Canopy {
         let mut triangle = self.meshes[instance.mesh as usize].triangle(number - self.first[at]);
         triangle.organ += instance.first_organ;
         if let Some(place) = &instance.place {
-            triangle.corners_m = triangle.corners_m.map(|corner| place.transform_point3(corner));
+            triangle.corners_m = triangle
+                .corners_m
+                .map(|corner| place.transform_point3(corner));
         }
         triangle
     }

@@ -9,8 +9,8 @@ use std::str;
 use glam::DVec3;
 
 use super::error::FormatError;
-use super::lines::{Fields, Lines};
 use super::geometry_file::{GeometryFile, numbered, vertex};
+use super::lines::{Fields, Lines};
 use crate::canopy::{Material, Organ};
 
 /// A polygon of more vertices is taken for a garbled count.
@@ -150,7 +150,9 @@ mod tests {
 
     fn corners(file: &GeometryFile) -> Vec<[DVec3; 3]> {
         let mesh = &file.mesh;
-        (0..mesh.len()).map(|t| mesh.triangle(t).corners_m).collect()
+        (0..mesh.len())
+            .map(|t| mesh.triangle(t).corners_m)
+            .collect()
     }
 
     fn refusal(bytes: impl AsRef<[u8]>) -> String {

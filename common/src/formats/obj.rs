@@ -6,8 +6,8 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use super::error::FormatError;
-use super::lines::{Fields, Lines};
 use super::geometry_file::{GeometryFile, numbered, vertex};
+use super::lines::{Fields, Lines};
 use crate::canopy::{Material, Organ};
 
 /// The name of a group, object or material where the file has none.

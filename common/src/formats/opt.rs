@@ -5,8 +5,8 @@
 
 use super::error::FormatError;
 use super::lines::{Fields, Lines};
-use crate::optics::{FaceOptics, LeafOptics};
 use crate::canopy::Material;
+use crate::optics::{FaceOptics, LeafOptics};
 
 /// What an `.opt` file holds; all of it physical.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,8 +3,8 @@
 use glam::DVec2;
 
 use super::error::{FormatError, Place};
-use super::lines::Lines;
 use super::geometry_file::MAX_COORDINATE;
+use super::lines::Lines;
 
 /// On anything smaller, in the file's unit, no plant stands.
 pub const MIN_SIDE: f64 = 1e-9;

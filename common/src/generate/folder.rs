@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 use super::canopy::Generated;
-use crate::light::sky::SkyError;
 use crate::light::Sky;
+use crate::light::sky::SkyError;
 
 /// Typical of green leaves; upper and lower faces differ, as they do in nature.
 const PAR_OPT: &str = "\

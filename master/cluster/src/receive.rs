@@ -9,7 +9,6 @@ use nestrad_kernel::rows::Counts;
 use nestrad_proto::v1::{ReturnRowsRequest, RowsHeader, return_rows_request};
 use tonic::{Code, Status, Streaming};
 
-
 /// What a result has to fit.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Expected {

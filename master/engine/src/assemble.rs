@@ -148,7 +148,11 @@ impl Parts<'_> {
         let [mut plants, mut soil] = [0.0; 2];
         for t in 0..self.frame.organ.len() {
             let absorbed = solution.triangles[t * bands + b].absorbed_W;
-            *(if self.frame.is_soil(t) { &mut soil } else { &mut plants }) += absorbed;
+            *(if self.frame.is_soil(t) {
+                &mut soil
+            } else {
+                &mut plants
+            }) += absorbed;
         }
         for row in self.frame.ends.faces() as usize..self.frame.rows() {
             soil += (1.0 - band.soil_albedo)
@@ -183,9 +187,7 @@ impl Parts<'_> {
         }
         let radiosity = outer_soil_radiosity_W_m2(self.optics, self.sources, b);
         let seen_m2 = |row: usize| {
-            self.frame.row_area_m2(row)
-                * self.outlook.exposed[row]
-                * self.outlook.outer_soil[row]
+            self.frame.row_area_m2(row) * self.outlook.exposed[row] * self.outlook.outer_soil[row]
         };
         radiosity * (0..self.frame.rows()).map(seen_m2).sum::<f64>()
     }
@@ -198,7 +200,8 @@ impl Parts<'_> {
         let frame = self.frame;
         if frame.ends.far_ends > 0 {
             let ground_m2 = frame.world.ground_area_m2();
-            return Exit::BOTH.map(|exit| self.irradiance.leaving_W_m2[k][exit as usize] * ground_m2);
+            return Exit::BOTH
+                .map(|exit| self.irradiance.leaving_W_m2[k][exit as usize] * ground_m2);
         }
         let mut sum = [0.0; 2];
         for (half, irradiance) in self.irradiance.halves.iter().enumerate() {
@@ -208,8 +211,7 @@ impl Parts<'_> {
                 &self.outlook.to_void[1 - half],
             );
             let mut add = |row: usize, radiosity: f64| {
-                let power =
-                    0.5 * radiosity * frame.row_area_m2(row) * self.outlook.exposed[row];
+                let power = 0.5 * radiosity * frame.row_area_m2(row) * self.outlook.exposed[row];
                 sum[0] += power * to_sky[row];
                 sum[1] += power * to_void[row];
             };

@@ -237,8 +237,7 @@ impl TracedCanopy {
                 incoming_W: &direct.incoming_W,
                 far_sample: sample,
             };
-            irradiance =
-                solve_system(&system, &plan.scattering_bands, &plan.tolerance, run.stop)?;
+            irradiance = solve_system(&system, &plan.scattering_bands, &plan.tolerance, run.stop)?;
             watch.lap("solve");
             run.stop.check()?;
         }
@@ -297,7 +296,8 @@ impl<'a> FramedLight<'a> {
         watch: &mut Stopwatch,
     ) -> Result<Direct, SolveError> {
         let sources = self.sources;
-        run.progress.stage("direct light", sources.list.len() as u64);
+        run.progress
+            .stage("direct light", sources.list.len() as u64);
         let line_areas_m2 = self.plan.line_areas_m2(&frame.world.extent, sources);
         let projections = (sources, &line_areas_m2[..]);
         let direct = direct_light(frame, &self.optics, projections, self.plan.seed, || {
@@ -339,7 +339,10 @@ fn at_once<A, B: Send>(
     let uncounted = Progress::default();
     let (here, there) = thread::scope(|scope| {
         let there = scope.spawn(|| {
-            let run = Run { stop: &stop, ..*run };
+            let run = Run {
+                stop: &stop,
+                ..*run
+            };
             there(&run).inspect_err(|_| stop.stop())
         });
         let run = Run {
@@ -347,7 +350,10 @@ fn at_once<A, B: Send>(
             progress: &uncounted,
         };
         let here = here(&run).inspect_err(|_| stop.stop());
-        (here, there.join().unwrap_or_else(|panic| resume_unwind(panic)))
+        (
+            here,
+            there.join().unwrap_or_else(|panic| resume_unwind(panic)),
+        )
     });
     match (here, there) {
         (Ok(here), Ok(there)) => Ok((here, there)),

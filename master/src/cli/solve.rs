@@ -201,9 +201,9 @@ impl Task {
         let solved = match &self.place.master {
             None => self.compute(&scene, &mut watch)?,
             Some(url) => {
-                let solved =
-                    self.place
-                        .solve(url, scene.clone(), &self.settings, self.notes)?;
+                let solved = self
+                    .place
+                    .solve(url, scene.clone(), &self.settings, self.notes)?;
                 watch.lap("at the master");
                 solved
             }

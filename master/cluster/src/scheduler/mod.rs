@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 use leases::{Lease, release};
 use solve::Solve;
-pub use solve::{SolveEnd, SolveCounts};
+pub use solve::{SolveCounts, SolveEnd};
 pub use terms::{BlockId, BlockSpec, Id, JobSpec, Leased, Refusal, Rules, Time};
 use worker::Worker;
 pub use worker::{WorkerCounts, WorkerFacts};

@@ -194,8 +194,7 @@ impl Direct {
             let t = frame.triangle_of_element[element] as usize;
             let material = &band.materials[frame.material[t] as usize];
             let absorbed = intensity * material.absorptance(face.upper);
-            self.element_variance_W2[element * bands + b] +=
-                absorbed * absorbed * face.variance_m4;
+            self.element_variance_W2[element * bands + b] += absorbed * absorbed * face.variance_m4;
         }
         if let Some(soil) = &frame.world.soil {
             for &(cell, points) in &lit.soil {

@@ -47,7 +47,8 @@ pub(super) struct Outline {
 impl Outline {
     /// By how much the absorptances across it differ in a band.
     pub(super) fn contrast(&self, band: &Band) -> f64 {
-        let of = |(material, upper): (u32, bool)| band.materials[material as usize].absorptance(upper);
+        let of =
+            |(material, upper): (u32, bool)| band.materials[material as usize].absorptance(upper);
         match self.difference {
             Difference::Edge(face) => of(face),
             Difference::Fold(a, b) => of(a) - of(b),

@@ -43,10 +43,7 @@ impl BlockOf {
     }
 
     /// The vertices of its triangles, metres.
-    pub fn corners(
-        &self,
-        frame: &Frame,
-    ) -> impl ExactSizeIterator<Item = [glam::DVec3; 3]> {
+    pub fn corners(&self, frame: &Frame) -> impl ExactSizeIterator<Item = [glam::DVec3; 3]> {
         let triangles = self.triangles.iter();
         triangles.map(|&(t, _)| frame.soup().triangle(t as usize))
     }

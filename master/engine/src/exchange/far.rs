@@ -36,7 +36,11 @@ pub struct FarRows {
 
 impl FarRows {
     /// Draws lines through the whole scene.
-    pub fn trace(frame: &Frame, sampling: &FarSampling, stop: &Stop) -> Result<Self, ExchangeError> {
+    pub fn trace(
+        frame: &Frame,
+        sampling: &FarSampling,
+        stop: &Stop,
+    ) -> Result<Self, ExchangeError> {
         let extent = &frame.world.extent;
         let size = extent.max_m - extent.min_m;
         let directions = HALF_BATCHES as u32 * sampling.sets_per_batch * Axes::Both.count();

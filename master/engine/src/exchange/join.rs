@@ -33,7 +33,10 @@ pub(super) fn join(
         && block.is_whole(frame)
     {
         check(rows, frame.rows(), frame.ends.len())?;
-        return Ok(BatchRows::new(&rows.lengths, std::mem::take(&mut rows.ends)));
+        return Ok(BatchRows::new(
+            &rows.lengths,
+            std::mem::take(&mut rows.ends),
+        ));
     }
     let runs = frame.rows().div_ceil(SORTED_TOGETHER);
     let rows_of: Vec<Vec<u32>> = parts

@@ -92,7 +92,9 @@ impl Work {
 }
 
 fn batches(sampling: &Sampling) -> Vec<Batch> {
-    (0..sampling.batches).map(|index| sampling.batch(index)).collect()
+    (0..sampling.batches)
+        .map(|index| sampling.batch(index))
+        .collect()
 }
 
 /// The result of a job.

@@ -207,7 +207,14 @@ impl Sizes {
                 (first, cost_s) = (k, 0.0);
             }
             if parts > 1 {
-                let part = |p| job(k..k + 1, Part::new(p, parts), None, this_s / f64::from(parts));
+                let part = |p| {
+                    job(
+                        k..k + 1,
+                        Part::new(p, parts),
+                        None,
+                        this_s / f64::from(parts),
+                    )
+                };
                 jobs.extend((0..parts).map(part));
                 first = k + 1;
             } else {

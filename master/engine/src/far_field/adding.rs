@@ -3,9 +3,9 @@
 //! Grant & Hunt 1969 (invariant embedding for layers that differ), with the first sweep from the top
 //! because beams come from there. Levels and layers count from the ground.
 
+use super::layer_slab::LayerSlab;
 use super::leaf::Bins;
 use super::matrix::{LEAST_LOSS, Lu, Matrix, dot, sum};
-use super::layer_slab::LayerSlab;
 
 /// Everything above a level, as seen from below.
 struct Above {
@@ -50,7 +50,10 @@ struct Step {
 impl Step {
     /// The layer under `above`, and what is above its lower level.
     fn new(layer: LayerSlab, above: Above, beams: &[f64]) -> (Self, Above) {
-        let LayerSlab { slab, beams: of_beams } = layer;
+        let LayerSlab {
+            slab,
+            beams: of_beams,
+        } = layer;
         let emit_up = of_beams.emit_up.times_column(beams);
         let emit_down = of_beams.emit_down.times_column(beams);
         let lost_below = slab.lost_from_above();

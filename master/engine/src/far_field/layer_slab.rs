@@ -54,6 +54,7 @@ mod tests {
 
     use super::super::layers::{Foliage, Layers};
     use super::super::leaf::Bins;
+    use super::super::matrix::sum;
     use super::super::medium::{Beams, Medium};
     use super::*;
 
@@ -82,7 +83,7 @@ mod tests {
         let beams = Beams::new(&[], 0);
         let medium = Medium::new(&layers, BINS, &band, &beams);
         let layer = medium.layer(&layers.foliage[0]);
-        Slab::of_layer(&layer.expect("there are leaves"))
+        LayerSlab::of_layer(&layer.expect("there are leaves")).slab
     }
 
     fn near(a: &Matrix, b: &Matrix, tolerance: f64) {

@@ -36,7 +36,7 @@ pub(super) struct Thin {
 }
 
 impl Slab {
-    /// A slab of `thickness` times the layer, the norm of its interaction at most [`START_NORM`].
+    /// A slab of `thickness` times the layer, the norm of its interaction at most an eighth.
     ///
     /// The notation is that of `docs/far_field.md`, "The thin slab": `z` is the interaction times
     /// the thickness, `jz` the same with the sign of upward rows changed, `d` what comes out less

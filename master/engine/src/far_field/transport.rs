@@ -17,7 +17,6 @@ use super::layers::Layers;
 use super::leaf::Bins;
 use super::medium::{Beams, Medium};
 
-
 /// Scattered light in a canopy, in one band.
 ///
 /// What comes straight from the sources is not in the radiances; all powers have it. Energy balance:

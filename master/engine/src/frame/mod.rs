@@ -21,8 +21,8 @@ use nestrad_kernel::world::World;
 use nestrad_kernel::{Block, BlockFault};
 
 pub use extent::{bounds_of, extent_of};
-pub(crate) use order::back;
 pub use order::Order;
+pub(crate) use order::back;
 
 /// How finely a canopy is cut, and how far near exchange reaches.
 #[derive(Clone, Debug)]
@@ -166,7 +166,8 @@ impl Frame {
     /// The share of a row (a face of an element, or a soil cell) above the soil, where the soil cuts it. Of what it
     /// does not cut, 1: the lines of a row that lies under the soil tell that it is buried.
     pub fn share_above_soil(&self, row: usize) -> f64 {
-        let (Some(&t), Some(soil)) = (self.triangle_of_element.get(row / 2), &self.world.soil) else {
+        let (Some(&t), Some(soil)) = (self.triangle_of_element.get(row / 2), &self.world.soil)
+        else {
             return 1.0;
         };
         let (corners, piece) = self.piece(row / 2, t);

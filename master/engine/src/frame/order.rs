@@ -69,12 +69,7 @@ impl Order {
     /// Sorted numbers of the organ and of the material of each sorted triangle.
     pub fn numbers(&self, canopy: &Canopy) -> (Vec<u32>, Vec<u32>) {
         let (organ_at, material_at) = (places(&self.organ), places(&self.material));
-        let numbers = |t: Triangle| {
-            (
-                organ_at[t.organ as usize],
-                material_at[t.material as usize],
-            )
-        };
+        let numbers = |t: Triangle| (organ_at[t.organ as usize], material_at[t.material as usize]);
         self.triangles(canopy).map(numbers).unzip()
     }
 

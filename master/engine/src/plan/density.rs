@@ -24,7 +24,11 @@ struct Piece {
 ///
 /// Measured in cubes of twice that side: for cells of area `a` and organs `o` of area `a_o` in them,
 /// `sum of a (a - a_o) / (volume of a cell x area of all)`. It does not depend on the order of the input.
-pub(super) fn around(canopy: &Canopy, marked: impl Fn(&Triangle) -> bool + Sync, organ_m: f64) -> f64 {
+pub(super) fn around(
+    canopy: &Canopy,
+    marked: impl Fn(&Triangle) -> bool + Sync,
+    organ_m: f64,
+) -> f64 {
     let cell_m = CELL * organ_m;
     if !(cell_m > 0.0 && cell_m.is_finite()) {
         return 0.0;
@@ -74,13 +78,13 @@ pub(super) fn around(canopy: &Canopy, marked: impl Fn(&Triangle) -> bool + Sync,
 #[cfg(test)]
 mod tests {
     use glam::DVec2;
-    use nestrad_common::scene::{Organ, Pattern};
+    use nestrad_common::canopy::{Mesh, Organ, Pattern};
     use proptest::prelude::*;
 
     use super::*;
 
     /// Level squares of two triangles, an organ each, 1 cm on a side.
-    fn leaves(at_m: &[DVec3], pattern_m: f64) -> Scene {
+    fn leaves(at_m: &[DVec3], pattern_m: f64) -> Canopy {
         let corner = |x, y| DVec3::new(x, y, 0.0) * 0.01;
         let [a, b, c, d] =
             [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)].map(|(x, y)| corner(x, y));
@@ -89,16 +93,21 @@ mod tests {
             id: "leaf".to_owned(),
             plant: "plant".to_owned(),
         };
-        Scene {
-            triangles: at_m.iter().flat_map(halves).collect(),
-            organ: (0..at_m.len() as u32).flat_map(|o| [o, o]).collect(),
-            organs: vec![organ; at_m.len()],
-            pattern: Some(Pattern {
-                min_m: DVec2::ZERO,
-                size_m: DVec2::splat(pattern_m),
-            }),
-            ..Scene::default()
-        }
+        let leaf = |(organ, at)| {
+            halves(at).map(|corners_m| Triangle {
+                corners_m,
+                organ,
+                material: 0,
+            })
+        };
+        let mesh: Mesh = (0..).zip(at_m).flat_map(leaf).collect();
+        let mut canopy = Canopy::of_meshes(vec![mesh]);
+        canopy.organs = vec![organ; at_m.len()];
+        canopy.pattern = Some(Pattern {
+            min_m: DVec2::ZERO,
+            size_m: DVec2::splat(pattern_m),
+        });
+        canopy
     }
 
     fn density(at_m: &[DVec3]) -> f64 {
@@ -123,7 +132,7 @@ mod tests {
     fn organs_do_not_count_for_themselves() {
         assert_eq!(density(&layers(2, 1)), 0.0);
         assert_eq!(density(&[]), 0.0);
-        assert_eq!(around(&Scene::default(), |_| true, f64::INFINITY), 0.0);
+        assert_eq!(around(&Canopy::default(), |_| true, f64::INFINITY), 0.0);
     }
 
     #[test]

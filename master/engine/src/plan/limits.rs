@@ -81,7 +81,10 @@ pub(super) fn check_height(scale: &Scale) -> Result<(), PlanError> {
 }
 
 pub(super) fn check_elements(canopy: &Canopy, max_edge_m: f64) -> Result<(), PlanError> {
-    let (found, most) = (Elements::count(canopy.corners_m(), max_edge_m), MOST_ELEMENTS);
+    let (found, most) = (
+        Elements::count(canopy.corners_m(), max_edge_m),
+        MOST_ELEMENTS,
+    );
     if found <= most {
         Ok(())
     } else {

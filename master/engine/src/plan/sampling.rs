@@ -137,25 +137,26 @@ pub(super) fn far_field(settings: &Settings, finer: f64) -> FarPlan {
 
 #[cfg(test)]
 mod tests {
-    use nestrad_common::scene::{Organ, Scene};
+    use glam::DVec3;
+    use nestrad_common::canopy::{Mesh, Organ, Triangle};
 
     use super::*;
 
     /// So many organs of so many triangles each, 1 cm² a triangle.
-    fn canopy(organs: u32, triangles: u32) -> (Problem, Scale) {
+    fn canopy(organs: u32, triangles: u32) -> (Canopy, Scale) {
         let all = organs * triangles;
         let organ = Organ {
             id: "leaf".to_owned(),
             plant: "plant".to_owned(),
         };
-        let problem = Problem {
-            scene: Scene {
-                triangles: vec![Default::default(); all as usize],
-                organs: vec![organ; organs as usize],
-                ..Scene::default()
-            },
-            ..Problem::default()
+        let triangle = |organ| Triangle {
+            corners_m: [DVec3::ZERO; 3],
+            organ,
+            material: 0,
         };
+        let mesh: Mesh = (0..all).map(|t| triangle(t / triangles)).collect();
+        let mut canopy = Canopy::of_meshes(vec![mesh]);
+        canopy.organs = vec![organ; organs as usize];
         let scale = Scale {
             area_m2: 1e-4 * f64::from(all),
             ground_area_m2: 1.0,
@@ -170,7 +171,7 @@ mod tests {
 
     fn on_organ(organs: u32, triangles: u32) -> f64 {
         let (canopy, scale) = canopy(organs, triangles);
-        lines_on_organ(&problem, &scale)
+        lines_on_organ(&canopy, &scale)
     }
 
     #[test]
@@ -197,19 +198,19 @@ mod tests {
         let sets = |organs, triangles| {
             let (canopy, scale) = canopy(organs, triangles);
             let aims = Aims::of(DEFAULT_ACCURACY_PERCENT);
-            lines(&problem, &scale, 0, &Settings::default(), &aims).sets_per_batch
+            lines(&canopy, &scale, 0, &Settings::default(), &aims).sets_per_batch
         };
         assert_eq!(sets(100, 600), 2);
         assert!((8..16).contains(&sets(100_000, 2)));
         // a batch has one set at the error that it says is the coarsest
         for (organs, triangles) in [(100, 600), (100_000, 2)] {
             let (canopy, scale) = canopy(organs, triangles);
-            let coarsest = coarsest_percent(&problem, &scale);
+            let coarsest = coarsest_percent(&canopy, &scale);
             let aims = Aims::of(coarsest * 1.000_001);
-            let sampling = lines(&problem, &scale, 0, &Settings::default(), &aims);
+            let sampling = lines(&canopy, &scale, 0, &Settings::default(), &aims);
             assert_eq!(sampling.sets_per_batch, 1);
             let aims = Aims::of(coarsest * 0.99);
-            let sampling = lines(&problem, &scale, 0, &Settings::default(), &aims);
+            let sampling = lines(&canopy, &scale, 0, &Settings::default(), &aims);
             assert_eq!(sampling.sets_per_batch, 2);
         }
     }

@@ -110,7 +110,8 @@ impl<const N: usize> Pass<'_, N> {
         let bands = self.bands.iter().enumerate();
         bands
             .map(|(k, &band)| Deviation {
-                halves_W: [&x, &y].map(|half| by_organ(&self.system, band, |row| half.irradiance[row][k])),
+                halves_W: [&x, &y]
+                    .map(|half| by_organ(&self.system, band, |row| half.irradiance[row][k])),
             })
             .collect()
     }
@@ -118,7 +119,12 @@ impl<const N: usize> Pass<'_, N> {
 
 /// Power that irradiances make organs absorb, W.
 fn by_organ(system: &System, band: usize, irradiance: impl Fn(usize) -> f64) -> Vec<f64> {
-    let System { frame, optics, outlook, .. } = system;
+    let System {
+        frame,
+        optics,
+        outlook,
+        ..
+    } = system;
     frame.sum_by_organ(&optics.bands[band], |e, optics| {
         [true, false].map(|upper| {
             let row = 2 * e + usize::from(!upper);

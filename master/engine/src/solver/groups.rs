@@ -35,7 +35,7 @@ impl Groups {
     /// Groups the elements of each organ, faces of one side together, and cells of the soil by four.
     ///
     /// The triangles of an organ have to lie one after the other, as the frame has them.
-    pub(crate) fn of(frame: &Frame) -> Self {
+    pub fn of(frame: &Frame) -> Self {
         let of_organs: Vec<OfOrgan> = organs(frame)
             .into_par_iter()
             .map(|elements| OfOrgan::of(frame, elements))

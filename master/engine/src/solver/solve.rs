@@ -108,8 +108,7 @@ impl Group<'_> {
         }
         all.passes = all.passes.max(pass.done);
         self.take(&pass, first, all);
-        all.of_element_size
-            .extend(pass.of_element_size());
+        all.of_element_size.extend(pass.of_element_size());
         if let Some(sample) = &self.system.far_sample {
             all.of_far_field.extend(pass.of_far_field(sample));
         }

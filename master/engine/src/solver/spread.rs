@@ -192,8 +192,7 @@ impl Spread<'_> {
         let (frame, elements) = (self.system.frame, self.system.frame.area_m2.len());
         let band = &self.system.optics.bands[self.bands[k]];
         sum.triangle_W2.resize(frame.organ.len(), 0.0);
-        sum.soil_W2_m4
-            .resize(frame.rows() - 2 * elements, 0.0);
+        sum.soil_W2_m4.resize(frame.rows() - 2 * elements, 0.0);
         sum.organ_W2.resize(frame.organs, 0.0);
         let mut organs = vec![[0.0; HALF_BATCHES]; frame.organs];
         let mut balance = [[0.0; HALF_BATCHES]; 4];

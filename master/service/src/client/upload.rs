@@ -31,8 +31,7 @@ pub(super) fn slices(scene: &Scene) -> impl Iterator<Item = v1::SceneSlice> + Se
     });
     let step = SLICE_BYTES / TRIANGLE_BYTES;
     let triangles = (0..canopy.len()).step_by(step);
-    let triangles =
-        triangles.map(move |from| Part::Triangles(triangle_slice(&canopy, from, step)));
+    let triangles = triangles.map(move |from| Part::Triangles(triangle_slice(&canopy, from, step)));
     let rest = organs.chain(triangles);
     std::iter::once(first).chain(rest.map(|part| v1::SceneSlice { part: Some(part) }))
 }

@@ -28,9 +28,8 @@ impl Lighting {
     /// Bytes that it takes, about.
     pub(super) fn bytes(&self) -> u64 {
         let bands = &self.optics.bands;
-        let band = |band: &nestrad_common::optics::Band| {
-            96 + band.name.len() + 32 * band.materials.len()
-        };
+        let band =
+            |band: &nestrad_common::optics::Band| 96 + band.name.len() + 32 * band.materials.len();
         let of_bands: usize = bands.iter().map(band).sum();
         let sources = self.light.suns.len() + usize::from(self.light.sky.is_some());
         (of_bands + sources * (56 + 8 * bands.len())) as u64

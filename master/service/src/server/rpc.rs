@@ -21,7 +21,7 @@ use super::intake::{Upload, lighting, settings};
 use super::metrics::Metrics;
 use super::scenes::Scenes;
 use super::slices;
-use super::solves::{Solve, Solves, Phase, stopping};
+use super::solves::{Phase, Solve, Solves, stopping};
 use nestrad_cluster::Cluster;
 use nestrad_cluster::scheduler::WorkerCounts;
 
@@ -141,7 +141,10 @@ impl SolveService for Rpc {
         let solve = self.solves.get(&solve_id)?;
         let Phase::Finished(outcome) = solve.phase() else {
             let state = solve.phase().message().as_str_name();
-            let message = format!("solve {}: expected a finished solve, found {state}", solve.id);
+            let message = format!(
+                "solve {}: expected a finished solve, found {state}",
+                solve.id
+            );
             return Err(ServiceError::new(ErrorCode::NotReady, message).into());
         };
         let table = v1::ResultTable::try_from(table).unwrap_or_default();

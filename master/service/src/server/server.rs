@@ -19,14 +19,13 @@ use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 use tonic_health::server::HealthReporter;
 
-use super::limits::ServiceLimits;
 use super::compute::{self, Means};
 use super::connection::incoming;
+use super::limits::ServiceLimits;
 use super::metrics::{Metrics, Now};
 use super::rpc::{Rpc, UPLOADS};
 use super::scenes::Scenes;
-use super::solves::{Solves, Phase};
-
+use super::solves::{Phase, Solves};
 
 /// Time for clients to come for what has just finished, and to hang up, when the master stops.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -193,7 +192,8 @@ impl Service {
 
     fn metrics_text(&self) -> String {
         let solves = self.solves.all();
-        let count = |of: fn(&Phase) -> bool| solves.iter().filter(|solve| of(&solve.phase())).count();
+        let count =
+            |of: fn(&Phase) -> bool| solves.iter().filter(|solve| of(&solve.phase())).count();
         self.metrics.text(&Now {
             queued: count(|state| matches!(state, Phase::Queued)),
             running: count(|state| matches!(state, Phase::Running)),

@@ -64,7 +64,13 @@ impl HeldSolution {
             sources: work.sources as u64,
         };
         Ok(Self {
-            bands: scene.lighting().optics.names().into_iter().map(str::to_owned).collect(),
+            bands: scene
+                .lighting()
+                .optics
+                .names()
+                .into_iter()
+                .map(str::to_owned)
+                .collect(),
             organs: canopy.organs.clone(),
             organ: canopy.triangles().map(|t| t.organ).collect(),
             origin_m: canopy.origin_m,

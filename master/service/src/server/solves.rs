@@ -10,11 +10,11 @@ use tokio::sync::watch;
 
 use super::error::{ErrorCode, ServiceError};
 use super::identity::{Id, solve_id};
-use super::solution::HeldSolution;
 use super::scenes::HeldScene;
+use super::solution::HeldSolution;
+use nestrad_engine::plan::Settings;
 use nestrad_engine::progress::Progress;
 use nestrad_engine::stop::Stop;
-use nestrad_engine::plan::Settings;
 
 /// Solves that have ended and are kept, however small their results.
 const MAX_ENDED: usize = 256;
@@ -304,7 +304,11 @@ impl Solves {
 
     /// Bytes of all results.
     pub(super) fn result_bytes(&self) -> u64 {
-        self.lock().solves.iter().map(|solve| solve.phase().bytes()).sum()
+        self.lock()
+            .solves
+            .iter()
+            .map(|solve| solve.phase().bytes())
+            .sum()
     }
 
     /// Every solve has ended, and whoever wanted its results has them, or did not come within that time.
@@ -314,13 +318,20 @@ impl Solves {
 
     /// Every solve has ended.
     pub(super) fn is_idle(&self) -> bool {
-        self.lock().solves.iter().all(|solve| solve.phase().has_ended())
+        self.lock()
+            .solves
+            .iter()
+            .all(|solve| solve.phase().has_ended())
     }
 
     /// Drops what has ended, the oldest first, until the rest is within its bounds.
     fn forget(&self, known: &mut Known) {
         let ended = |solve: &Solve| solve.phase().has_ended();
-        let too_old = |solve: &Solve| lock(&solve.times).ended.is_some_and(|at| at.elapsed() > KEPT);
+        let too_old = |solve: &Solve| {
+            lock(&solve.times)
+                .ended
+                .is_some_and(|at| at.elapsed() > KEPT)
+        };
         known.solves.retain(|solve| !too_old(solve));
         let mut count = known.solves.iter().filter(|solve| ended(solve)).count();
         let mut bytes: u64 = known.solves.iter().map(|solve| solve.phase().bytes()).sum();

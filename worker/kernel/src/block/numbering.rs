@@ -28,7 +28,11 @@ const NO_ROW: u32 = u32::MAX;
 
 impl Numbering {
     /// Of runs of triangles that have so many elements together.
-    pub(super) fn new(frame: &BlockFrame, ends: &Ends, elements: usize) -> Result<Self, BlockFault> {
+    pub(super) fn new(
+        frame: &BlockFrame,
+        ends: &Ends,
+        elements: usize,
+    ) -> Result<Self, BlockFault> {
         let local_faces = 2 * elements as u32;
         let others = ends.len() as u32 - ends.faces();
         let mut numbering = Self {

@@ -110,10 +110,7 @@ fn what_is_not_there_is_refused() {
             },
             "owned_soil out of range",
         ),
-        (
-            |b| b.world.extent.max_m.x = f64::NAN,
-            "extent out of range",
-        ),
+        (|b| b.world.extent.max_m.x = f64::NAN, "extent out of range"),
         (
             |b| b.world.radius_m = f64::NAN,
             "sphere_radius_m out of range",

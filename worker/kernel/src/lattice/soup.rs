@@ -93,7 +93,9 @@ impl Soup {
         let mut hit = [false; BLOCK];
         for (block, start) in self.blocks.iter().zip((0..self.len).step_by(BLOCK)) {
             let n = BLOCK.min(self.len - start);
-            let columns = block.each_ref().map(|v| v.each_ref().map(|axis| &axis[..n]));
+            let columns = block
+                .each_ref()
+                .map(|v| v.each_ref().map(|axis| &axis[..n]));
             for (number, lattice) in lattices.iter().enumerate() {
                 reach::test(lattice, columns, &mut hit[..n]);
                 for k in (0..n).filter(|&k| hit[k]) {

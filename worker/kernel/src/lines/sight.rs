@@ -140,7 +140,11 @@ impl<'a> Sight<'a> {
     /// The far end that stands for what is seen along a line past a depth; random by line and depth.
     fn far(&self, line: usize, depth: u32, direction_z: f64) -> u32 {
         let Some(grid) = &self.block.far else {
-            return if direction_z < 0.0 { self.below } else { self.sky };
+            return if direction_z < 0.0 {
+                self.below
+            } else {
+                self.sky
+            };
         };
         let hash = ((line as u64) << 32 | u64::from(depth)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
         let nx = self.lattice.nx as usize;

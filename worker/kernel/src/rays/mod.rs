@@ -155,11 +155,7 @@ fn from_soil(
         if block.row_of(row).is_none() {
             continue;
         }
-        let count = share.rays_of(
-            soil.cell_area_m2(),
-            soil.cell_m.max_element(),
-            end,
-        );
+        let count = share.rays_of(soil.cell_area_m2(), soil.cell_m.max_element(), end);
         let mut rng = share.numbers(end);
         let at = DVec2::new(
             f64::from(cell % soil.cells[0]),

@@ -80,8 +80,7 @@ impl Tree {
     /// copies of them that reach into it.
     pub(super) fn of(block: &Block, keep: impl Fn(usize) -> bool) -> Self {
         let extent = &block.extent;
-        let (mut lo, mut hi) =
-            geometry::bounds_of(block.soup.triangles()).unwrap_or_default();
+        let (mut lo, mut hi) = geometry::bounds_of(block.soup.triangles()).unwrap_or_default();
         let (z_min_m, z_max_m) = (lo.z, hi.z);
         // rays begin on the soil too, which may reach far beyond the leaves
         (lo, hi) = (lo.min(extent.min_m), hi.max(extent.max_m));

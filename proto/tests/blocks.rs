@@ -2,70 +2,74 @@
 
 #![allow(clippy::unwrap_used)]
 
-use nestrad_proto::{mesh, v1};
-use nestrad_worker::{Block, Demand};
+use std::sync::Arc;
+
+use glam::{DVec2, DVec3};
+use nestrad_kernel::block::{BlockFrame, CellRun, TriangleRun};
+use nestrad_kernel::far_grid::Levels;
+use nestrad_kernel::lattice::Extent;
+use nestrad_kernel::soil::SoilGrid;
+use nestrad_kernel::world::World;
+use nestrad_proto::{near_field, v1};
 use proptest::prelude::*;
 use prost::Message;
 
 fn block() -> v1::Block {
-    let vector = |x, y, z| Some(v1::Vector { x, y, z });
     let at = |k: u32| f64::from(k * 7 % 18) / 18.0;
-    v1::Block {
-        world: Some(v1::World {
-            min_m: vector(0.0, 0.0, 0.0),
-            max_m: vector(1.0, 1.0, 1.0),
-            periodic: true,
+    let triangle = |t: u32| {
+        [0, 1, 2].map(|corner| DVec3::from([0, 1, 2].map(|axis| at(9 * t + 3 * corner + axis))))
+    };
+    let frame = BlockFrame {
+        world: World {
+            extent: Extent {
+                min_m: DVec3::ZERO,
+                max_m: DVec3::ONE,
+                periodic: true,
+            },
             elements: 5,
-            soil: Some(v1::SoilPlane {
+            soil: Some(SoilGrid {
                 z_m: 0.0,
-                cell_x_m: 0.5,
-                cell_y_m: 0.5,
-                cells_x: 2,
-                cells_y: 2,
-                ..v1::SoilPlane::default()
+                min_m: DVec2::ZERO,
+                cell_m: DVec2::splat(0.5),
+                cells: [2, 2],
             }),
-            sphere_radius_m: 0.4,
-            far_levels: 5,
-            far_bins: 3,
-        }),
-        mesh: Some(mesh::pack(
-            [0, 1]
-                .map(|t| {
-                    [0, 1, 2].map(|corner| [0, 1, 2].map(|axis| at(9 * t + 3 * corner + axis)))
-                })
-                .into_iter(),
-        )),
+            radius_m: 0.4,
+            far: Some(Arc::new(Levels { levels: 5, bins: 3 })),
+        },
         runs: vec![
-            v1::TriangleRun {
+            TriangleRun {
                 triangles: 1,
+                skipped_elements: 0,
                 divisions: 2,
                 owned: true,
-                ..v1::TriangleRun::default()
+                solid: false,
             },
-            v1::TriangleRun {
+            TriangleRun {
                 triangles: 1,
+                skipped_elements: 0,
                 divisions: 1,
+                owned: false,
                 solid: true,
-                ..v1::TriangleRun::default()
             },
         ],
         owned_soil: [0, 2]
-            .map(|skipped_cells| v1::CellRun {
+            .map(|skipped_cells| CellRun {
                 cells: 1,
                 skipped_cells,
             })
             .to_vec(),
-    }
+    };
+    near_field::block_message(&frame, [0, 1].map(triangle).into_iter()).unwrap()
 }
 
 #[test]
 fn the_block_is_taken_as_it_is() {
-    assert!(Block::new(&block()).is_ok());
+    assert!(near_field::block(&block()).is_ok());
 }
 
 /// Whether it takes no more memory than a worker might have that looks first, as workers do.
 fn fits(message: &v1::Block) -> bool {
-    Demand::of_message(message).block_bytes() < 1 << 30
+    near_field::demand(message).block_bytes() < 1 << 30
 }
 
 proptest! {
@@ -82,7 +86,7 @@ proptest! {
         }
         if let Ok(message) = v1::Block::decode(&bytes[..])
             && fits(&message)
-            && let Ok(taken) = Block::new(&message)
+            && let Ok(taken) = near_field::block(&message)
         {
             prop_assert!(taken.ends() >= 4);
         }
@@ -93,7 +97,7 @@ proptest! {
         if let Ok(message) = v1::Block::decode(&bytes[..])
             && fits(&message)
         {
-            let _ = Block::new(&message);
+            let _ = near_field::block(&message);
         }
     }
 }
