@@ -2,13 +2,14 @@
 
 mod random;
 
+use nestrad_common::canopy::Canopy;
+use nestrad_common::light::Light;
 use nestrad_common::options::Diameter;
-use nestrad_common::scene::Scene;
 use nestrad_proto::v1;
 use nestrad_proto::v1::scene_material::Kind;
 
 use super::*;
-use nestrad_engine::plan::Estimator;
+use nestrad_engine::plan::{Estimator, Settings};
 
 fn header() -> v1::GeometryHeader {
     let material = |name: &str, kind: Kind| v1::SceneMaterial {
@@ -51,7 +52,7 @@ fn received(
     header: &v1::GeometryHeader,
     organs: v1::OrganSlice,
     triangles: &v1::TriangleSlice,
-) -> Result<HeldGeometry, ServiceError> {
+) -> Result<HeldCanopy, ServiceError> {
     let mut upload = Upload::begin(header)?;
     upload.triangles(triangles)?;
     upload.organs(organs)?;
@@ -67,22 +68,25 @@ fn refusal<T>(result: Result<T, ServiceError>) -> String {
 #[test]
 fn a_scene_moves_to_its_local_origin_as_files_do() {
     let held = received(&header(), organs(), &triangles()).unwrap();
-    let scene = &held.scene;
-    assert_eq!(scene.origin_m, DVec3::new(10.0, 20.0, 0.0));
-    assert_eq!(scene.triangles[0][1], DVec3::new(10.7 - 10.0, 0.5, 0.1));
-    assert_eq!(scene.soil_z_m, Some(-0.5));
-    assert_eq!(scene.materials[1], Material::Stem { species: 2 });
-    assert_eq!((scene.organ[1], scene.material[1]), (1, 1));
+    let canopy = &held.canopy;
+    assert_eq!(canopy.origin_m, DVec3::new(10.0, 20.0, 0.0));
+    assert_eq!(
+        canopy.triangle(0).corners_m[1],
+        DVec3::new(10.7 - 10.0, 0.5, 0.1)
+    );
+    assert_eq!(canopy.soil_z_m, Some(-0.5));
+    assert_eq!(canopy.materials[1], Material::Stem { species: 2 });
+    let second = canopy.triangle(1);
+    assert_eq!((second.organ, second.material), (1, 1));
     assert_eq!(held.inspection.plants, 1);
 }
 
 #[test]
 fn a_scene_at_its_local_origin_stays_there_bit_for_bit() {
-    let first = received(&header(), organs(), &triangles()).unwrap().scene;
+    let first = received(&header(), organs(), &triangles()).unwrap().canopy;
     let again = v1::TriangleSlice {
         vertices_m: first
-            .triangles
-            .iter()
+            .corners_m()
             .flatten()
             .flat_map(|v| v.to_array())
             .collect(),
@@ -97,9 +101,11 @@ fn a_scene_at_its_local_origin_stays_there_bit_for_bit() {
         }),
         ..header()
     };
-    let second = received(&header, organs(), &again).unwrap().scene;
-    let origin_m = first.origin_m;
-    assert_eq!(Scene { origin_m, ..second }, first);
+    let second = received(&header, organs(), &again).unwrap().canopy;
+    let mut second = Canopy::clone(&second);
+    assert_eq!(second.origin_m, DVec3::ZERO);
+    second.origin_m = first.origin_m;
+    assert_eq!(second, *first);
 }
 
 #[test]
@@ -267,10 +273,18 @@ fn sun() -> v1::ParallelSource {
 
 const MATERIALS: [Material; 2] = [Material::Leaf { species: 1 }, Material::Stem { species: 2 }];
 
+fn light_of(source: v1::ParallelSource) -> Result<Light, ServiceError> {
+    let header = v1::SceneHeader {
+        bands: vec![band("PAR")],
+        sources: vec![source],
+        ..v1::SceneHeader::default()
+    };
+    lighting(&header, &MATERIALS).map(|lighting| Light::clone(&lighting.light))
+}
+
 #[test]
 fn directions_become_unit_vectors_once() {
-    let first = light(&[band("PAR")], (&[sun()], 0), &MATERIALS).unwrap();
-    let direction = first.sources[0].direction;
+    let direction = light_of(sun()).unwrap().suns[0].direction;
     assert!(direction.abs_diff_eq(DVec3::new(0.6, 0.0, -0.8), 1e-15));
     for k in 0..1000 {
         let turned = DVec3::new(0.1 + 1e-3 * f64::from(k), 0.3, -0.7).normalize();
@@ -280,8 +294,7 @@ fn directions_become_unit_vectors_once() {
             direction_z: turned.z,
             ..sun()
         };
-        let light = light(&[band("PAR")], (&[given], 0), &MATERIALS).unwrap();
-        assert_eq!(light.sources[0].direction, turned);
+        assert_eq!(light_of(given).unwrap().suns[0].direction, turned);
     }
 }
 
@@ -290,7 +303,12 @@ fn light_that_cannot_be_is_refused() {
     let with = |change: fn(&mut Vec<v1::BandOptics>, &mut v1::ParallelSource)| {
         let (mut bands, mut source) = (vec![band("PAR")], sun());
         change(&mut bands, &mut source);
-        refusal(light(&bands, (&[source], 0), &MATERIALS))
+        let header = v1::SceneHeader {
+            bands,
+            sources: vec![source],
+            ..v1::SceneHeader::default()
+        };
+        refusal(lighting(&header, &MATERIALS))
     };
     for (message, said) in [
         (with(|b, _| b.clear()), "bands: expected 1 to 256, found 0"),
@@ -344,13 +362,76 @@ fn light_that_cannot_be_is_refused() {
     }
 }
 
+fn sky() -> v1::SkyLight {
+    use v1::sky_light::Radiance;
+    v1::SkyLight {
+        radiance: Some(Radiance::CieClear(v1::CieClearSky {
+            towards_sun: Some(v1::Vector {
+                x: 0.6,
+                y: 0.0,
+                z: 0.8,
+            }),
+        })),
+        irradiance_w_m2: vec![500.0],
+        diffuse_fraction: 0.3,
+    }
+}
+
+#[test]
+fn skies_that_cannot_be_are_refused() {
+    use v1::sky_light::Radiance;
+    let with = |change: fn(&mut v1::SkyLight)| {
+        let mut sky = sky();
+        change(&mut sky);
+        let header = v1::SceneHeader {
+            bands: vec![band("PAR")],
+            sky: Some(sky),
+            ..v1::SceneHeader::default()
+        };
+        lighting(&header, &MATERIALS)
+    };
+    let taken = with(|_| {}).unwrap().light;
+    let towards_sun = DVec3::new(0.6, 0.0, 0.8);
+    let radiance = taken.sky.as_ref().unwrap().radiance;
+    assert_eq!(
+        radiance,
+        nestrad_common::light::sky::Radiance::CieClear { towards_sun }
+    );
+    for (result, said) in [
+        (
+            with(|s| s.radiance = None),
+            "sky.radiance: expected uniform",
+        ),
+        (
+            with(|s| s.radiance = Some(Radiance::CieClear(v1::CieClearSky::default()))),
+            "sky.cie_clear.towards_sun: expected a direction that points up",
+        ),
+        (
+            with(|s| s.diffuse_fraction = 0.0),
+            "sky.diffuse_fraction: expected above 0 to 1",
+        ),
+        (
+            with(|s| s.diffuse_fraction = f64::NAN),
+            "sky.diffuse_fraction",
+        ),
+        (
+            with(|s| s.irradiance_w_m2.push(1.0)),
+            "sky.irradiance_W_m2: expected 1, one per band, found 2",
+        ),
+        (
+            with(|s| s.irradiance_w_m2[0] = -1.0),
+            "sky.irradiance_W_m2[0]",
+        ),
+    ] {
+        let message = refusal(result);
+        assert!(message.contains(said), "{said}: {message}");
+    }
+}
+
 #[test]
 fn options_have_the_defaults_of_the_command_line() {
     let of = |given: v1::SolveOptions| settings(&given, 8.0);
-    assert_eq!(
-        of(v1::SolveOptions::default()),
-        Ok(crate::plan::Settings::default())
-    );
+    assert_eq!(of(v1::SolveOptions::default()), Ok(Settings::default()));
     let given = of(v1::SolveOptions {
         diameter_m: Some(f64::INFINITY),
         budget_s: Some(60.0),

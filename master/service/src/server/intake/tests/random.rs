@@ -14,11 +14,7 @@ fn take_in(slices: Vec<v1::SceneSlice>) {
     for part in slices.into_iter().filter_map(|slice| slice.part) {
         let fits = match (part, &mut upload) {
             (Part::Header(header), _) => {
-                let _ = light(
-                    &header.bands,
-                    (&header.sources, header.sky_directions),
-                    &MATERIALS,
-                );
+                let _ = lighting(&header, &MATERIALS);
                 if let Some(Geometry::NewGeometry(new)) = &header.geometry {
                     upload = Upload::begin(new).ok();
                 }
@@ -56,10 +52,10 @@ proptest! {
     ) {
         use v1::scene_slice::Part;
         let header = v1::SceneHeader {
-            sky_directions: 0,
             geometry: Some(v1::scene_header::Geometry::NewGeometry(header())),
             bands: vec![band("PAR")],
             sources: vec![sun()],
+            sky: Some(sky()),
         };
         let mut messages = [
             slice(Part::Header(header)),
