@@ -39,10 +39,13 @@ impl fmt::Debug for Store {
     }
 }
 
+/// What is to be written.
+type Written = (Key, Arc<PackedRows>);
+
 struct Shared {
     file: Arc<Mutex<Option<File>>>,
     /// `None` once nothing can be written any more.
-    waiting: Mutex<Option<SyncSender<(Key, Arc<PackedRows>)>>>,
+    waiting: Mutex<Option<SyncSender<Written>>>,
     writer: Mutex<Option<JoinHandle<()>>>,
     /// What went wrong, for whoever asks.
     warning: Arc<Mutex<Option<String>>>,
