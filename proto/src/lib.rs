@@ -1,5 +1,7 @@
 //! The messages that master, workers and clients exchange, generated from `nestrad/v1/*.proto`, which
 //! documents them field by field, and the channels that they travel on.
+//!
+//! This crate may import the kernel and `nestrad-common`; [`near_field`] turns their types into messages and back.
 
 #![allow(non_snake_case, reason = "units in names are written as units")]
 
