@@ -26,6 +26,7 @@ pub mod progress;
 pub mod rounds;
 pub mod run;
 pub mod solution;
+mod solve_error;
 pub mod solver;
 pub mod stop;
 pub mod stopwatch;

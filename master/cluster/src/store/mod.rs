@@ -203,11 +203,7 @@ impl Drop for Shared {
 }
 
 /// Writes what comes, all that is waiting at once.
-fn write(
-    waiting: &Receiver<(Key, Arc<PackedRows>)>,
-    file: &Mutex<Option<File>>,
-    warning: &Mutex<Option<String>>,
-) {
+fn write(waiting: &Receiver<Written>, file: &Mutex<Option<File>>, warning: &Mutex<Option<String>>) {
     while let Ok(first) = waiting.recv() {
         let mut results = vec![first];
         results.extend(waiting.try_iter().take(WAITING));

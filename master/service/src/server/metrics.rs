@@ -31,7 +31,7 @@ pub struct Metrics {
     pub(super) network_bytes: Family<OfDirection, Counter>,
     pub(super) connections: Gauge,
     held: Held,
-    recent: Mutex<VecDeque<Traced>>,
+    recent: Mutex<VecDeque<TracedJobs>>,
 }
 
 /// Set when they are asked for.
@@ -66,7 +66,7 @@ pub(super) struct Now {
 }
 
 #[derive(Clone, Copy, Debug)]
-struct Traced {
+struct TracedJobs {
     at: Instant,
     segments: u64,
     rays: u64,
@@ -228,7 +228,7 @@ impl Metrics {
                 .inc_by(cost.wall_s);
         }
         let mut recent = self.recent();
-        recent.push_back(Traced {
+        recent.push_back(TracedJobs {
             at: Instant::now(),
             segments: summary.segments,
             rays: summary.rays,
@@ -238,13 +238,13 @@ impl Metrics {
     /// Segments and rays per second, over the last minute.
     pub(super) fn rates(&self) -> (f64, f64) {
         let recent = self.recent();
-        let per_s = |of: fn(&Traced) -> u64| {
+        let per_s = |of: fn(&TracedJobs) -> u64| {
             recent.iter().map(of).sum::<u64>() as f64 / RATE_OVER.as_secs_f64()
         };
         (per_s(|traced| traced.segments), per_s(|traced| traced.rays))
     }
 
-    fn recent(&self) -> std::sync::MutexGuard<'_, VecDeque<Traced>> {
+    fn recent(&self) -> std::sync::MutexGuard<'_, VecDeque<TracedJobs>> {
         let mut recent = self.recent.lock().unwrap_or_else(PoisonError::into_inner);
         while recent
             .front()

@@ -1,0 +1,57 @@
+//! Why a solve fails.
+
+use nestrad_kernel::BlockFault;
+use thiserror::Error;
+
+use crate::exchange::ExchangeError;
+use crate::solver::SolverError;
+use crate::stop::Stopped;
+
+/// Why there is no solution.
+#[derive(Debug, Error)]
+pub enum SolveError {
+    /// The kernel refused the canopy.
+    #[error("the canopy cannot be traced")]
+    Block(#[from] BlockFault),
+    /// The exchange could not be computed.
+    #[error(transparent)]
+    Exchange(ExchangeError),
+    /// The solver did not converge.
+    #[error(transparent)]
+    Solver(SolverError),
+    /// Light is lost or gained, far beyond what the sampling leaves uncertain.
+    #[error(
+        "the energy balance of band {band} does not close: {:.1} % of the incoming light is unaccounted for, where sampling leaves {:.1} % uncertain: faces of very different size see each other by too few lines, expected a finer --accuracy or a scene whose parts are nearer in size",
+        100.0 * missing,
+        100.0 * stated
+    )]
+    Unbalanced {
+        /// Name of the band.
+        band: String,
+        /// What is missing, in parts of the incoming light.
+        missing: f64,
+        /// Its standard error.
+        stated: f64,
+    },
+    /// It is not wanted any more.
+    #[error(transparent)]
+    Stopped(#[from] Stopped),
+}
+
+impl From<ExchangeError> for SolveError {
+    fn from(error: ExchangeError) -> Self {
+        match error {
+            ExchangeError::Stopped(stopped) => Self::Stopped(stopped),
+            error => Self::Exchange(error),
+        }
+    }
+}
+
+impl From<SolverError> for SolveError {
+    fn from(error: SolverError) -> Self {
+        match error {
+            SolverError::Stopped(stopped) => Self::Stopped(stopped),
+            error => Self::Solver(error),
+        }
+    }
+}
