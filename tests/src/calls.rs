@@ -1,13 +1,12 @@
 //! Calls of a master's client service, each of which is answered within a bounded time.
 
 use std::future::Future;
-use std::sync::Arc;
 
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::Settings;
-use nestrad_master::remote::{self, Client};
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::Settings;
 use nestrad_proto::channel::{Credentials, connect};
 use nestrad_proto::v1;
+use nestrad_service::client::{self, Client, SolvedThere};
 
 use crate::processes::{Master, PATIENCE};
 
@@ -23,7 +22,7 @@ pub fn block_on<T>(future: impl Future<Output = T>) -> T {
 
 /// A client without credentials. To be called within a runtime.
 pub fn client(master: &Master) -> Client {
-    remote::client(connect(&master.url(), &Credentials::default()).unwrap())
+    client::client(connect(&master.url(), &Credentials::default()).unwrap())
 }
 
 /// A material of that kind.
@@ -57,7 +56,7 @@ pub fn one_leaf() -> [v1::SceneSlice; 3] {
             soil_albedo: 0.0,
             materials: vec![v1::MaterialOptics::default()],
         }],
-        sky_directions: 0,
+        sky: None,
         sources: vec![v1::ParallelSource {
             direction_z: -1.0,
             irradiance_w_m2: vec![100.0],
@@ -120,7 +119,7 @@ pub async fn ended(client: &mut Client, solve_id: &str) -> v1::SolveProgress {
 }
 
 /// A whole solve.
-pub async fn solve(client: Client, problem: Arc<Problem>, settings: &Settings) -> remote::Remote {
-    let solved = remote::solve(client, problem, settings, |_| {}, std::future::pending());
+pub async fn solve(client: Client, scene: Scene, settings: &Settings) -> SolvedThere {
+    let solved = client::solve(client, scene, settings, |_| {}, std::future::pending());
     solved.await.unwrap()
 }

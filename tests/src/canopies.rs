@@ -1,47 +1,50 @@
-//! Generated canopies as problems.
+//! Generated canopies as scenes.
 
 use std::collections::HashMap;
 use std::num::NonZeroUsize;
 
 use glam::DVec2;
+use nestrad_common::canopy::{Material, Organ, Triangle};
 use nestrad_common::generate::{Generated, LeafAngles, LeafShape, Maize, RandomCanopy, Stand};
 use nestrad_common::light::{Sky, SkyLight, Source};
 use nestrad_common::optics::{Band, FaceOptics, LeafOptics};
-use nestrad_common::problem::Problem;
-use nestrad_common::scene::{Material, Organ, Scene};
+
+use crate::scenery::Scenery;
 
 /// A generated canopy without bands and sources. Organs are leaves; the number of `leaf 0` (stems)
 /// of a plant is its own organ, of a solid material.
-pub fn scene(generated: &Generated) -> Scene {
-    let mut scene = Scene {
-        triangles: generated.triangles.clone(),
+pub fn unlit(generated: &Generated) -> Scenery {
+    let mut scenery = Scenery {
         materials: vec![Material::Stem { species: 1 }, Material::Leaf { species: 1 }],
         pattern: Some(generated.pattern),
         soil_z_m: Some(generated.soil_z_m),
-        ..Scene::default()
+        ..Scenery::default()
     };
     let mut organs: HashMap<(u32, u32), u32> = HashMap::new();
-    for label in &generated.labels {
+    for (corners_m, label) in generated.triangles.iter().zip(&generated.labels) {
         let next = organs.len() as u32;
         let organ = *organs.entry((label.plant, label.leaf)).or_insert(next);
         if organ == next {
-            scene.organs.push(Organ {
+            scenery.organs.push(Organ {
                 id: (1000 * label.plant + label.leaf).to_string(),
                 plant: label.plant.to_string(),
             });
         }
-        scene.organ.push(organ);
-        scene.material.push(u32::from(label.leaf > 0));
+        scenery.triangles.push(Triangle {
+            corners_m: *corners_m,
+            organ,
+            material: u32::from(label.leaf > 0),
+        });
     }
-    scene
+    scenery
 }
 
-/// A problem with one leaf material over a soil plane.
-pub fn problem(
+/// A generated canopy with one leaf material over a soil plane, under sources.
+pub fn scenery(
     generated: &Generated,
     bands: &[(LeafOptics, f64)],
     sources: Vec<Source>,
-) -> Problem {
+) -> Scenery {
     let band = |&(leaf, soil_albedo): &(LeafOptics, f64)| Band {
         name: format!("rho {} tau {}", leaf.upper.rho, leaf.upper.tau),
         soil_albedo,
@@ -50,22 +53,24 @@ pub fn problem(
             leaf,
         ],
     };
-    Problem {
-        scene: scene(generated),
+    Scenery {
         bands: bands.iter().map(band).collect(),
         sources,
-        sky_directions: 0,
+        ..unlit(generated)
     }
 }
 
-/// A uniform sky of 100 W m⁻² in every band.
+/// The directions of a uniform sky of 100 W m⁻² in every band, as sources that are meant as they are.
 pub fn uniform_sky(directions: usize, bands: usize) -> Vec<Source> {
-    let sky = SkyLight {
-        sky: Sky::UniformOvercast,
-        irradiance_W_m2: vec![100.0; bands],
-    };
+    let sky = sky(&Sky::UniformOvercast, bands);
     sky.sources(NonZeroUsize::new(directions).unwrap(), 1)
-        .unwrap()
+}
+
+/// A sky of 100 W m⁻² in every band that has no sun.
+pub fn sky(of: &Sky, bands: usize) -> SkyLight {
+    let light = of.light(vec![100.0; bands]).unwrap();
+    assert!(light.suns.is_empty());
+    light.sky.unwrap()
 }
 
 /// Square leaves of 1 cm² or so in a layer of 2 m: a leaf is small against the distance that light

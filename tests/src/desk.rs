@@ -3,10 +3,9 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Output;
-use std::sync::Arc;
 
 use nestrad_common::assemble::{load, load_scene_file};
-use nestrad_common::problem::Problem;
+use nestrad_common::scene::Scene;
 use tempfile::TempDir;
 
 use crate::processes::{Master, finish, nestrad, said};
@@ -108,8 +107,8 @@ impl Desk {
     }
 
     /// What a scene file says.
-    pub fn problem(&self, scene: &str) -> Arc<Problem> {
+    pub fn scene(&self, scene: &str) -> Scene {
         let inputs = load_scene_file(&self.path(scene)).unwrap();
-        Arc::new(load(&inputs).unwrap().problem)
+        load(&inputs).unwrap().scene
     }
 }

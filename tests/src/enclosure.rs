@@ -78,6 +78,6 @@ pub fn closed_box(scenery: &mut Scenery, min: DVec3, size: DVec3) {
 
 /// A horizontal plate that fills a pattern exactly once, moved by `offset` past its edges.
 pub fn full_plate(scenery: &mut Scenery, organ: &str, z_m: f64, offset_m: DVec2) {
-    let size = scenery.problem.scene.pattern.unwrap().size_m;
+    let size = scenery.pattern.unwrap().size_m;
     scenery.level(organ, offset_m.extend(z_m), size);
 }

@@ -1,4 +1,4 @@
-//! Problems that go the whole way: written as files, read back through the one door for input.
+//! Scenes that go the whole way: written as files, read back through the one door for input.
 
 use std::fs;
 use std::path::Path;
@@ -7,7 +7,7 @@ use glam::DVec3;
 use nestrad_common::assemble::load;
 use nestrad_common::inputs::{BandInput, Inputs, LightInput, PatternInput};
 use nestrad_common::options::Unit;
-use nestrad_common::problem::Problem;
+use nestrad_common::scene::Scene;
 
 /// What is written as a CAN scene: leaves of species 1, each an organ of its own.
 #[derive(Clone, Debug)]
@@ -30,8 +30,8 @@ pub struct Written<'a> {
 
 impl Written<'_> {
     /// Writes the files to a folder and loads them.
-    pub fn load(&self, folder: &Path) -> Problem {
-        load(&self.inputs(folder)).unwrap().problem
+    pub fn load(&self, folder: &Path) -> Scene {
+        load(&self.inputs(folder)).unwrap().scene
     }
 
     /// Writes the files to a folder.

@@ -1,30 +1,37 @@
 //! Form factors between organs, counted from the rows that the kernel gives.
 
-use nestrad_common::ends::Side;
-use nestrad_common::problem::Problem;
-use nestrad_master::exchange::{BlockOf, Exchange, Sampling, trace_here};
-use nestrad_master::solution::Estimate;
-use nestrad_master::world::World;
+use nestrad_common::canopy::Canopy;
+use nestrad_engine::exchange::{Exchange, Sampling, ThisProcess};
+use nestrad_engine::frame::{Cut, Frame};
+use nestrad_engine::solution::Estimate;
+use nestrad_kernel::ends::Side;
 
-/// A scene that has been traced.
+use crate::solving::trace;
+
+/// A canopy that has been traced. Organs have the canopy's numbers here, rows the frame's.
 pub struct Traced {
     /// As it was cut and numbered.
-    pub world: World,
+    pub frame: Frame,
     /// What everything sees.
     pub exchange: Exchange,
     organ_of_element: Vec<usize>,
 }
 
 impl Traced {
-    /// Traces a scene whose elements have edges of at most `max_edge_m`.
-    pub fn new(problem: &Problem, max_edge_m: f64, sampling: &Sampling) -> Self {
-        let world = World::new(&problem.scene, max_edge_m, 0.1, f64::INFINITY, (0, 0));
-        let whole = [BlockOf::whole(&world)];
-        let exchange = trace_here(&problem.scene, &world, &whole, sampling, || Ok(())).unwrap();
-        let organ = |&t: &u32| problem.scene.organ[t as usize] as usize;
+    /// Traces a canopy whose elements have edges of at most `max_edge_m`.
+    pub fn new(canopy: &Canopy, max_edge_m: f64, sampling: &Sampling) -> Self {
+        let cut = Cut {
+            max_edge_m,
+            soil_cell_m: 0.1,
+            radius_m: f64::INFINITY,
+            far: None,
+        };
+        let frame = Frame::new(canopy, &cut).unwrap();
+        let exchange = trace(&frame, sampling, &ThisProcess::default());
+        let organ = |&t: &u32| organ_of(&frame, t as usize);
         Self {
-            organ_of_element: world.triangle_of_element.iter().map(organ).collect(),
-            world,
+            organ_of_element: frame.triangle_of_element.iter().map(organ).collect(),
+            frame,
             exchange,
         }
     }
@@ -34,15 +41,22 @@ impl Traced {
         let elements = 0..self.organ_of_element.len();
         elements
             .filter(|&e| self.organ_of_element[e] == organ)
-            .map(|e| self.world.ends.face(e as u32, side) as usize)
+            .map(|e| self.frame.ends.face(e as u32, side) as usize)
             .collect()
     }
 
     /// Whether an end is that side of an organ.
     pub fn is(&self, end: u32, organ: usize, side: Side) -> bool {
-        end < self.world.ends.faces()
+        end < self.frame.ends.faces()
             && end % 2 == side as u32
             && self.organ_of_element[end as usize / 2] == organ
+    }
+
+    /// Whether an organ is something solid.
+    pub fn is_solid(&self, organ: usize) -> bool {
+        let mut triangles = 0..self.frame.organ.len();
+        let first = triangles.find(|&t| organ_of(&self.frame, t) == organ);
+        self.frame.is_solid(first.unwrap())
     }
 
     /// Part of the light that leaves `rows` (evenly over their area) for ends of which `hits` holds,
@@ -69,7 +83,7 @@ impl Traced {
             let seen: f64 = counts.iter().map(|c| c.0).sum();
             let all: f64 = counts.iter().map(|c| c.1).sum();
             assert!(all > 0.0, "row {row} sees nothing at all");
-            let row_area = self.world.row_area_m2(row as u32);
+            let row_area = self.frame.row_area_m2(row);
             sum += row_area * seen / all;
             area += row_area;
             pulls.resize(counts.len(), 0.0);
@@ -91,4 +105,9 @@ impl Traced {
             self.is(end, to.0, to.1)
         })
     }
+}
+
+/// The canopy's number of the organ of a triangle of the frame.
+fn organ_of(frame: &Frame, triangle: usize) -> usize {
+    frame.order.organ[frame.organ[triangle] as usize] as usize
 }

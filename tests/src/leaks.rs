@@ -1,9 +1,9 @@
 //! How much is seen through a closed mesh.
 
 use glam::DVec3;
-use nestrad_common::ends::Side;
-use nestrad_master::exchange::Sampling;
-use nestrad_master::plan::Estimator;
+use nestrad_engine::exchange::Sampling;
+use nestrad_engine::plan::Estimator;
+use nestrad_kernel::ends::Side;
 
 use crate::enclosure::sphere;
 use crate::form_factor::Traced;
@@ -24,8 +24,7 @@ pub struct Leaks {
 /// rays a face.
 pub fn of_sphere(offset_m: DVec3, estimator: Estimator, effort: f64, seed: u64) -> Leaks {
     let mut scenery = sphere(4);
-    let vertices = scenery.problem.scene.triangles.iter_mut().flatten();
-    vertices.for_each(|v| *v += offset_m);
+    scenery.vertices_m().for_each(|v| *v += offset_m);
     let sampling = Sampling {
         seed,
         ..match estimator {
@@ -34,8 +33,8 @@ pub fn of_sphere(offset_m: DVec3, estimator: Estimator, effort: f64, seed: u64) 
         }
     };
     // no face is cut: edges of facets are what may leak
-    let traced = Traced::new(&scenery.problem, 10.0, &sampling);
-    let (faces, mut found) = (traced.world.ends.faces(), Leaks::default());
+    let traced = Traced::new(&scenery.canopy(), 10.0, &sampling);
+    let (faces, mut found) = (traced.frame.ends.faces(), Leaks::default());
     for row in 0..faces {
         for half in &traced.exchange.halves {
             for &end in half.row(row as usize) {
@@ -46,8 +45,8 @@ pub fn of_sphere(offset_m: DVec3, estimator: Estimator, effort: f64, seed: u64) 
         }
     }
     found.sent = match estimator {
-        Estimator::Lines => traced.exchange.counters.lines,
-        Estimator::Rays => traced.exchange.counters.rays,
+        Estimator::Lines => traced.exchange.counts.lines,
+        Estimator::Rays => traced.exchange.counts.rays,
     };
     found
 }

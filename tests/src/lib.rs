@@ -16,6 +16,7 @@ pub mod calls;
 pub mod canopies;
 pub mod chart;
 pub mod crew;
+pub mod cutting;
 pub mod desk;
 pub mod enclosure;
 pub mod extremes;

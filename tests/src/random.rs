@@ -1,16 +1,18 @@
 //! Small scenes drawn at random, tame ones for properties and wild ones to look for faults. A scene is
 //! its seed: what failed once is tested by its number.
 
+use std::sync::Arc;
+
 use glam::{DVec2, DVec3};
-use nestrad_common::assemble::{Geometry, build_scene};
+use nestrad_common::assemble::{Geometry, build_canopy};
+use nestrad_common::canopy::Canopy;
 use nestrad_common::formats::can;
 use nestrad_common::formats::pattern::Rectangle;
-use nestrad_common::light::Source;
-use nestrad_common::optics::{Band, FaceOptics, LeafOptics};
+use nestrad_common::light::{Light, Source};
+use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
 use nestrad_common::options::Unit;
-use nestrad_common::problem::Problem;
 use nestrad_common::scene::Scene;
-use nestrad_master::plan::Plan;
+use nestrad_engine::plan::Plan;
 
 use crate::scenery::{Scenery, from_zenith};
 
@@ -59,7 +61,7 @@ impl Dice {
 
 /// One to six triangles of two materials, `leaf` and `other`, alone or repeated, over soil or not, under
 /// two sources in one band; every triangle is an organ.
-pub fn scene(seed: u64) -> Scenery {
+pub fn scenery(seed: u64) -> Scenery {
     let mut dice = Dice(seed);
     let mut scenery = match dice.below(3) {
         0 => Scenery::open(),
@@ -82,11 +84,11 @@ pub fn scene(seed: u64) -> Scenery {
 
 /// Makes a plan for a small scene as cheap as can be: coarse elements, few lines, no rays.
 pub fn cheap(plan: &mut Plan) {
-    plan.max_edge_m = 0.4;
-    plan.soil_cell_m = 0.2;
-    plan.direct_line_area_m2 = plan.scale.ground_area_m2 / 2e3;
-    plan.tolerance.absorbed = 1e-9;
-    if let Some(sampling) = &mut plan.sampling {
+    plan.trace.max_edge_m = 0.4;
+    plan.trace.soil_cell_m = 0.2;
+    plan.light.direct_line_area_m2 = plan.scale.ground_area_m2 / 2e3;
+    plan.light.tolerance.absorbed = 1e-9;
+    if let Some(sampling) = &mut plan.trace.sampling {
         sampling.line_area_m2 = plan.scale.ground_area_m2 / 60.0;
         sampling.least_samples = 0.0;
     }
@@ -155,7 +157,7 @@ fn wild_triangle(dice: &mut Dice, earlier: &[[DVec3; 3]]) -> [DVec3; 3] {
 /// # Errors
 ///
 /// Gives the message of a refusal.
-pub fn wild(seed: u64) -> Result<Problem, String> {
+pub fn wild(seed: u64) -> Result<Scene, String> {
     let mut dice = Dice(seed);
     let mut triangles: Vec<[DVec3; 3]> = Vec::new();
     for _ in 0..1 + dice.below(12) {
@@ -172,27 +174,27 @@ pub fn wild(seed: u64) -> Result<Problem, String> {
         text += "\n";
     }
     let unit = [Unit::Metre, Unit::Centimetre, Unit::Millimetre][dice.below(3)];
-    let mesh = can::parse("wild.can", text.as_bytes()).map_err(|e| e.to_string())?;
+    let file = can::parse("wild.can", text.as_bytes()).map_err(|e| e.to_string())?;
     let corners = [0.0, 0.0, wild_number(&mut dice), wild_number(&mut dice)];
     let geometry = Geometry {
-        meshes: vec![mesh],
+        files: vec![file],
         pattern: (dice.below(2) > 0)
             .then(|| Rectangle::from_corners(corners))
             .flatten(),
         soil: (dice.below(2) > 0).then(|| wild_number(&mut dice)),
         unit,
     };
-    let (scene, origins) = build_scene(geometry).map_err(|e| e.to_string())?;
-    nestrad_common::inspection::inspect(&scene, &origins);
-    Ok(lit(&mut dice, scene))
+    let (canopy, origins) = build_canopy(geometry).map_err(|e| e.to_string())?;
+    nestrad_common::inspection::inspect(&canopy, &origins);
+    Ok(lit(&mut dice, canopy))
 }
 
-fn lit(dice: &mut Dice, scene: Scene) -> Problem {
+fn lit(dice: &mut Dice, canopy: Canopy) -> Scene {
     let bands = 1 + dice.below(3);
     let band = |b: usize, dice: &mut Dice| Band {
         name: format!("B{b}"),
         soil_albedo: [0.0, 0.5, 1.0][dice.below(3)],
-        materials: scene
+        materials: canopy
             .materials
             .iter()
             .map(|_| match dice.below(4) {
@@ -203,7 +205,7 @@ fn lit(dice: &mut Dice, scene: Scene) -> Problem {
             .collect(),
     };
     let bands: Vec<Band> = (0..bands).map(|b| band(b, dice)).collect();
-    let sources = (0..dice.below(4))
+    let suns = (0..dice.below(4))
         .map(|_| {
             let zenith = [0.0, 45.0, 60.0, 89.9, 89.99, 90.0 * dice.unit()][dice.below(6)];
             let azimuth = [0.0, 90.0, 45.0, 360.0 * dice.unit()][dice.below(4)];
@@ -218,10 +220,9 @@ fn lit(dice: &mut Dice, scene: Scene) -> Problem {
             }
         })
         .collect();
-    Problem {
-        scene,
-        bands,
-        sources,
-        sky_directions: 0,
+    Scene {
+        canopy: Arc::new(canopy),
+        optics: Arc::new(Optics { bands }),
+        light: Arc::new(Light { suns, sky: None }),
     }
 }

@@ -6,8 +6,8 @@ use std::path::{Path, PathBuf};
 
 use nestrad_common::assemble::load;
 use nestrad_common::inputs::{BandInput, Inputs, LightInput, PatternInput};
-use nestrad_common::problem::Problem;
-use nestrad_master::solution::Solution;
+use nestrad_common::scene::Scene;
+use nestrad_engine::solution::Solution;
 
 /// The folder of sample scenes (`NESTRAD_SHARED`, or `../shared` beside the workspace), if this
 /// machine has it.
@@ -23,7 +23,7 @@ pub fn shared() -> Option<PathBuf> {
 }
 
 /// A sample scene in two bands under a clear sky.
-pub fn sample(folder: &Path, name: &str, soil_m: f64) -> Problem {
+pub fn sample(folder: &Path, name: &str, soil_m: f64) -> Scene {
     let scenes = folder.join("scenes");
     let band = |band: &str, file: &str| BandInput {
         name: band.into(),
@@ -38,7 +38,7 @@ pub fn sample(folder: &Path, name: &str, soil_m: f64) -> Problem {
         light: Some(LightInput::File(scenes.join("clear.light"))),
         ..Inputs::default()
     };
-    load(&inputs).unwrap().problem
+    load(&inputs).unwrap().scene
 }
 
 /// An absorbed power and its standard error, W, by organ and band.
@@ -89,16 +89,16 @@ pub struct Misfit {
 }
 
 /// Compares the organs of a band.
-pub fn misfit(problem: &Problem, solution: &Solution, reference: &Organs, band: usize) -> Misfit {
-    let bands = problem.bands.len();
+pub fn misfit(scene: &Scene, solution: &Solution, reference: &Organs, band: usize) -> Misfit {
+    let bands = scene.optics.len();
     let (mut error2, mut own2, mut stated2, mut z2) = (0.0, 0.0, 0.0, 0.0);
     let (mut area, mut absorbed, mut organs) = (0.0, 0.0, 0);
-    for (o, organ) in problem.scene.organs.iter().enumerate() {
+    for (o, organ) in scene.canopy.organs.iter().enumerate() {
         let a = solution.organ_area_m2[o];
         if a < LEAST_ORGAN_M2 {
             continue;
         }
-        let key = (organ.id.clone(), problem.bands[band].name.clone());
+        let key = (organ.id.clone(), scene.optics.bands[band].name.clone());
         let (value, se) = reference[&key];
         let item = &solution.organs[o * bands + band];
         let error = item.absorbed_W - value;

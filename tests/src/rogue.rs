@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 
+use nestrad_proto::near_field;
 use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
 use nestrad_proto::v1::{
     self, FetchBlockRequest, GiveBackRequest, JoinRequest, LeaseRequest, LeasedJob, RenewRequest,
@@ -28,7 +29,7 @@ pub fn honest_join() -> JoinRequest {
         name: "rogue".to_owned(),
         threads: 4,
         memory_bytes: 1 << 33,
-        kernel: nestrad_worker::kernel().to_owned(),
+        kernel: nestrad_kernel::kernel().to_owned(),
     }
 }
 
@@ -101,20 +102,20 @@ impl Rogue {
             Ok(bytes)
         });
         let message = v1::Block::decode(&bytes.unwrap()[..]).unwrap();
-        let block = nestrad_worker::Block::new(&message).unwrap();
-        let tracer = nestrad_worker::Tracer::new(&block);
-        let batch = job.batch.as_ref().unwrap();
-        let rows = nestrad_worker::trace_packed(&block, || &tracer, batch);
+        let block = near_field::block(&message).unwrap();
+        let tracer = nestrad_kernel::Tracer::new(&block);
+        let batch = near_field::batch(job.batch.as_ref().unwrap());
+        let rows = nestrad_kernel::trace(&block, || &tracer, &batch).packed(&block);
         let header = RowsHeader {
             worker_id: self.id,
             lease_id: job.lease_id,
             packed_bytes: rows.packed.len() as u64,
             checksum: blake3::hash(&rows.packed).as_bytes().to_vec(),
-            rows: rows.rows,
-            entries: rows.entries,
-            lines: rows.lines,
-            segments: rows.segments,
-            rays: rows.rays,
+            rows: block.rows() as u32,
+            entries: rows.counts.row_entries,
+            lines: rows.counts.lines,
+            segments: rows.counts.segments,
+            rays: rows.counts.rays,
             compute_s: 0.1,
         };
         (header, rows.packed)

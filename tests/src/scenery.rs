@@ -1,17 +1,34 @@
 //! Scenes made by hand, one surface after the other.
 
-use glam::{DVec2, DVec3};
-use nestrad_common::elements::Elements;
-use nestrad_common::light::Source;
-use nestrad_common::optics::{Band, LeafOptics};
-use nestrad_common::problem::Problem;
-use nestrad_common::scene::{Material, Organ, Pattern};
+use std::sync::Arc;
 
-/// A problem in the making: surfaces first, then bands, then sources.
-#[derive(Clone, Debug, Default)]
+use glam::{DVec2, DVec3};
+use nestrad_common::canopy::{Canopy, Material, Mesh, Organ, Pattern, Triangle};
+use nestrad_common::light::{Light, SkyLight, Source};
+use nestrad_common::optics::{Band, LeafOptics, Optics};
+use nestrad_common::scene::Scene;
+use nestrad_kernel::elements::Elements;
+
+/// A scene in the making: surfaces first, then bands, then sources. All of it may be changed until a [`Scene`] is
+/// made of it.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Scenery {
-    /// What has been built so far.
-    pub problem: Problem,
+    /// In order.
+    pub triangles: Vec<Triangle>,
+    /// What triangles are of.
+    pub organs: Vec<Organ>,
+    /// What triangles are made of.
+    pub materials: Vec<Material>,
+    /// Where it repeats.
+    pub pattern: Option<Pattern>,
+    /// Height of the soil plane.
+    pub soil_z_m: Option<f64>,
+    /// Optics of the materials.
+    pub bands: Vec<Band>,
+    /// Parallel sources.
+    pub sources: Vec<Source>,
+    /// A sky besides.
+    pub sky: Option<SkyLight>,
 }
 
 impl Scenery {
@@ -22,49 +39,51 @@ impl Scenery {
 
     /// A scene that repeats on a rectangle with a corner at the origin, above a black void.
     pub fn periodic(size_m: DVec2) -> Self {
-        let mut scenery = Self::default();
-        scenery.problem.scene.pattern = Some(Pattern {
-            min_m: DVec2::ZERO,
-            size_m,
-        });
-        scenery
+        Self {
+            pattern: Some(Pattern {
+                min_m: DVec2::ZERO,
+                size_m,
+            }),
+            ..Self::default()
+        }
     }
 
     /// Puts a soil plane under it.
     #[must_use]
     pub fn soil(mut self, z_m: f64) -> Self {
-        self.problem.scene.soil_z_m = Some(z_m);
+        self.soil_z_m = Some(z_m);
         self
     }
 
     /// Adds a triangle of an organ that is also its material's name up to the first space: organs
     /// `leaf 1` and `leaf 2` are both of material `leaf`.
-    pub fn triangle(&mut self, organ: &str, corners: [DVec3; 3]) {
-        let scene = &mut self.problem.scene;
+    pub fn triangle(&mut self, organ: &str, corners_m: [DVec3; 3]) {
         let name = organ.split(' ').next().unwrap_or_default();
         let material = Material::Named(name.to_owned());
         let number = |found: Option<usize>, end: usize| found.unwrap_or(end) as u32;
         let m = number(
-            scene.materials.iter().position(|known| *known == material),
-            scene.materials.len(),
+            self.materials.iter().position(|known| *known == material),
+            self.materials.len(),
         );
-        if m as usize == scene.materials.len() {
-            scene.materials.push(material);
+        if m as usize == self.materials.len() {
+            self.materials.push(material);
         }
         // organs are built one after the other: the last one is the one to look at
         let o = number(
-            scene.organs.iter().rposition(|known| known.id == organ),
-            scene.organs.len(),
+            self.organs.iter().rposition(|known| known.id == organ),
+            self.organs.len(),
         );
-        if o as usize == scene.organs.len() {
-            scene.organs.push(Organ {
+        if o as usize == self.organs.len() {
+            self.organs.push(Organ {
                 id: organ.to_owned(),
                 plant: "1".to_owned(),
             });
         }
-        scene.triangles.push(corners);
-        scene.organ.push(o);
-        scene.material.push(m);
+        self.triangles.push(Triangle {
+            corners_m,
+            organ: o,
+            material: m,
+        });
     }
 
     /// Adds a planar quadrilateral; its upper face is the one that sees its corners turn to the left.
@@ -88,8 +107,8 @@ impl Scenery {
                 .map_or(LeafOptics::default(), |(_, optics)| *optics),
             _ => LeafOptics::default(),
         };
-        let materials = self.problem.scene.materials.iter().map(of).collect();
-        self.problem.bands.push(Band {
+        let materials = self.materials.iter().map(of).collect();
+        self.bands.push(Band {
             name: name.to_owned(),
             soil_albedo,
             materials,
@@ -98,21 +117,57 @@ impl Scenery {
 
     /// Adds a source with the same irradiance (W m⁻² on the horizontal) in all bands built so far.
     pub fn source(&mut self, direction: DVec3, irradiance_W_m2: f64) {
-        self.problem.sources.push(Source {
+        self.sources.push(Source {
             direction: direction.normalize(),
-            irradiance_W_m2: vec![irradiance_W_m2; self.problem.bands.len()],
+            irradiance_W_m2: vec![irradiance_W_m2; self.bands.len()],
         });
+    }
+
+    /// The vertices of each triangle, to be looked at.
+    pub fn corners_m(&self) -> impl ExactSizeIterator<Item = &[DVec3; 3]> {
+        self.triangles.iter().map(|triangle| &triangle.corners_m)
+    }
+
+    /// The vertices of all triangles, to be moved.
+    pub fn vertices_m(&mut self) -> impl Iterator<Item = &mut DVec3> {
+        self.triangles
+            .iter_mut()
+            .flat_map(|triangle| &mut triangle.corners_m)
     }
 
     /// Number of elements when edges are at most `max_edge_m`.
     pub fn elements(&self, max_edge_m: f64) -> usize {
-        Elements::divide(&self.problem.scene, max_edge_m).len()
+        Elements::divide(self.corners_m().copied(), max_edge_m).len()
     }
 
     /// Number of an organ.
     pub fn organ(&self, id: &str) -> usize {
-        let organs = &self.problem.scene.organs;
-        organs.iter().position(|organ| organ.id == id).unwrap()
+        self.organs.iter().position(|organ| organ.id == id).unwrap()
+    }
+
+    /// The geometry alone.
+    pub fn canopy(&self) -> Canopy {
+        let mesh: Mesh = self.triangles.iter().copied().collect();
+        let mut canopy = Canopy::of_meshes(vec![mesh]);
+        canopy.organs = self.organs.clone();
+        canopy.materials = self.materials.clone();
+        canopy.pattern = self.pattern;
+        canopy.soil_z_m = self.soil_z_m;
+        canopy
+    }
+
+    /// The scene as it is now.
+    pub fn scene(&self) -> Scene {
+        Scene {
+            canopy: Arc::new(self.canopy()),
+            optics: Arc::new(Optics {
+                bands: self.bands.clone(),
+            }),
+            light: Arc::new(Light {
+                suns: self.sources.clone(),
+                sky: self.sky.clone(),
+            }),
+        }
     }
 }
 

@@ -1,13 +1,20 @@
-//! Solves, from a problem to its results.
+//! Plans and solves, from a scene to its results: the one place where tests call the engine for a whole solve.
 
-use nestrad_common::directions::Axes;
-use nestrad_common::problem::Problem;
-use nestrad_master::exchange::Sampling;
-use nestrad_master::output::progress::Progress;
-use nestrad_master::output::resources::Stopwatch;
-use nestrad_master::plan::{Estimator, Plan, Settings};
-use nestrad_master::run::{self, Finished, RunError};
-use nestrad_master::solution::Solution;
+use nestrad_common::canopy::Canopy;
+use nestrad_common::light::Sources;
+use nestrad_common::scene::Scene;
+use nestrad_engine::exchange::{Exchange, RowSource, Sampling, ThisProcess};
+use nestrad_engine::frame::Frame;
+use nestrad_engine::lit_canopy::LitCanopy;
+use nestrad_engine::plan::{Aims, Estimator, Plan, PlanError, Settings, TracePlan};
+use nestrad_engine::progress::Progress;
+use nestrad_engine::rounds::{self, RoundsError, solve_in_rounds};
+use nestrad_engine::run::Run;
+use nestrad_engine::solution::Solution;
+use nestrad_engine::stop::Stop;
+use nestrad_engine::stopwatch::Stopwatch;
+use nestrad_engine::traced::{self, SolveError, WorkDone};
+use nestrad_kernel::directions::Axes;
 
 /// Both ways of sampling the exchange.
 pub const ESTIMATORS: [Estimator; 2] = [Estimator::Lines, Estimator::Rays];
@@ -29,19 +36,104 @@ pub fn coarse() -> Settings {
     }
 }
 
+/// What came of a solve.
+#[derive(Clone, Debug)]
+pub struct Solved {
+    /// The results.
+    pub solution: Solution,
+    /// How much was computed.
+    pub work: WorkDone,
+}
+
 /// What nestrad plans to do.
-pub fn plan(problem: &Problem, settings: &Settings) -> Plan {
-    Plan::new(problem, settings).unwrap()
+pub fn plan(scene: &Scene, settings: &Settings) -> Plan {
+    try_plan(scene, settings).unwrap()
+}
+
+/// What nestrad plans to do, or why it cannot.
+pub fn try_plan(scene: &Scene, settings: &Settings) -> Result<Plan, PlanError> {
+    let sources = sources(scene, &Aims::of(settings.accuracy_percent), settings.seed);
+    Plan::new(&lit(scene, &sources), settings)
+}
+
+/// What nestrad plans to do with an error to aim at for each part.
+pub fn aimed(scene: &Scene, settings: &Settings, aims: &Aims) -> Plan {
+    let sources = sources(scene, aims, settings.seed);
+    Plan::aimed(&lit(scene, &sources), settings, aims).unwrap()
 }
 
 /// Solves as planned for these settings.
-pub fn solve(problem: &Problem, settings: &Settings) -> Finished {
-    finish(problem, &plan(problem, settings)).unwrap()
+pub fn solve(scene: &Scene, settings: &Settings) -> Solved {
+    finish(scene, &plan(scene, settings)).unwrap()
 }
 
 /// Solves by a plan that a test has changed.
-pub fn finish(problem: &Problem, plan: &Plan) -> Result<Finished, RunError> {
-    run::solve(problem, plan, &Progress::new(true), &mut Stopwatch::start())
+pub fn finish(scene: &Scene, plan: &Plan) -> Result<Solved, SolveError> {
+    finish_by(scene, plan, &ThisProcess::default())
+}
+
+/// The same with rows from a source.
+pub fn finish_by(scene: &Scene, plan: &Plan, rows: &dyn RowSource) -> Result<Solved, SolveError> {
+    let sources = sources(scene, &plan.aims, plan.light.seed);
+    finish_lit(&lit(scene, &sources), plan, rows)
+}
+
+/// The same under sources that a test has chosen.
+pub fn finish_lit(
+    lit: &LitCanopy,
+    plan: &Plan,
+    rows: &dyn RowSource,
+) -> Result<Solved, SolveError> {
+    let watch = &mut Stopwatch::start();
+    let (solution, work) = unwatched(|run| traced::solve(lit, plan, rows, run, watch))?;
+    Ok(Solved { solution, work })
+}
+
+/// Solves in rounds, as the program does.
+pub fn in_rounds(scene: &Scene, settings: &Settings) -> Result<rounds::Solved, RoundsError> {
+    in_rounds_by(scene, settings, &ThisProcess::default())
+}
+
+/// The same with rows from a source.
+pub fn in_rounds_by(
+    scene: &Scene,
+    settings: &Settings,
+    rows: &dyn RowSource,
+) -> Result<rounds::Solved, RoundsError> {
+    let watch = &mut Stopwatch::start();
+    unwatched(|run| solve_in_rounds(scene, settings, rows, run, watch, |_, _| ()))
+}
+
+/// The sources of a scene, with as many directions of its sky as aims ask for.
+pub fn sources(scene: &Scene, aims: &Aims, seed: u64) -> Sources {
+    scene.light.sources(aims.sky_directions(), seed)
+}
+
+/// A scene under these sources, in place of its own light.
+pub fn lit<'a>(scene: &'a Scene, sources: &'a Sources) -> LitCanopy<'a> {
+    LitCanopy {
+        canopy: &scene.canopy,
+        optics: &scene.optics,
+        sources,
+    }
+}
+
+/// Lends a run that nobody stops and nobody looks at.
+pub fn unwatched<T>(work: impl FnOnce(&Run) -> T) -> T {
+    work(&Run {
+        stop: &Stop::default(),
+        progress: &Progress::default(),
+    })
+}
+
+/// A canopy, cut and numbered as planned.
+pub fn frame(canopy: &Canopy, plan: &TracePlan) -> Frame {
+    Frame::new(canopy, &plan.cut()).unwrap()
+}
+
+/// What all sees, by a source of rows.
+pub fn trace(frame: &Frame, sampling: &Sampling, rows: &dyn RowSource) -> Exchange {
+    unwatched(|run| Exchange::trace(frame, sampling, rows, run)).unwrap()
 }
 
 /// A sampling of 16 batches by lines of that pitch, or by that many rays a face in each half.

@@ -2,21 +2,18 @@
 
 #![allow(clippy::unwrap_used)]
 
+use nestrad_common::canopy::Organ;
 use nestrad_common::generate::{LeafAngles, Maize, Stand};
-use nestrad_common::problem::Problem;
-use nestrad_master::errors::organ_errors;
-use nestrad_master::output::progress::Progress;
-use nestrad_master::output::resources::Stopwatch;
-use nestrad_master::plan::{Aims, Estimator, Plan, Settings};
-use nestrad_master::rounds::{Ended, Reached, solve_in_rounds};
-use nestrad_master::run::Means;
-use nestrad_tests::canopies::{par_and_nir, problem, small_leaves, uniform_sky};
-use nestrad_tests::solving::{apart_percent, plan, solve};
+use nestrad_common::scene::Scene;
+use nestrad_engine::account::organ_spread;
+use nestrad_engine::plan::{Aims, Estimator, Settings};
+use nestrad_engine::rounds::{Ended, Solved};
+use nestrad_tests::canopies::{par_and_nir, scenery, small_leaves, uniform_sky};
+use nestrad_tests::scenery::Scenery;
+use nestrad_tests::solving::{apart_percent, in_rounds, plan, solve, try_plan};
 
-fn reach(problem: &Problem, settings: &Settings) -> Reached {
-    let (means, progress) = (Means::default(), Progress::new(true));
-    let watch = &mut Stopwatch::start();
-    solve_in_rounds(problem, None, settings, means, &progress, watch, |_, _| ()).unwrap()
+fn reach(scene: &Scene, settings: &Settings) -> Solved {
+    in_rounds(scene, settings).unwrap()
 }
 
 fn asked(accuracy_percent: f64) -> Settings {
@@ -27,7 +24,7 @@ fn asked(accuracy_percent: f64) -> Settings {
     }
 }
 
-fn maize(plants_per_row: u32) -> Problem {
+fn maize(plants_per_row: u32) -> Scenery {
     let plant = Maize {
         stand: Stand {
             rows: 1,
@@ -38,7 +35,7 @@ fn maize(plants_per_row: u32) -> Problem {
         leaf_triangle_m2: 1e-3,
         ..Maize::default()
     };
-    problem(
+    scenery(
         &plant.generate().unwrap(),
         &par_and_nir(),
         uniform_sky(46, 2),
@@ -47,15 +44,15 @@ fn maize(plants_per_row: u32) -> Problem {
 
 #[test]
 fn the_error_that_is_asked_for_is_reached_and_true() {
-    let problem = maize(2);
+    let scene = maize(2).scene();
     let by_rays = Settings {
         estimator: Estimator::Rays,
         accuracy_percent: 0.5,
         seed: 77,
         ..Settings::default()
     };
-    let reference = solve(&problem, &by_rays).solution;
-    let of_reference = organ_errors(&problem.scene, &reference);
+    let reference = solve(&scene, &by_rays).solution;
+    let of_reference = organ_spread(&scene.canopy.plants(), &reference);
     for percent in [2.0, 1.0, 0.5] {
         let mut squares = [[0.0; 2]; 2];
         for seed in 1..=3 {
@@ -63,11 +60,11 @@ fn the_error_that_is_asked_for_is_reached_and_true() {
                 seed,
                 ..asked(percent)
             };
-            let reached = reach(&problem, &settings);
+            let reached = reach(&scene, &settings);
             assert_eq!(reached.accuracy.ended, Ended::Reached, "{percent}");
             for (band, parts) in reached.accuracy.errors.iter().enumerate() {
                 let of_reference = of_reference[band].rms_percent.unwrap();
-                let apart = apart_percent(&reached.finished.solution, &reference, band);
+                let apart = apart_percent(&reached.solution, &reference, band);
                 let stated = parts.total_percent();
                 let own = (apart.powi(2) - of_reference.powi(2)).max(0.0).sqrt();
                 assert!(
@@ -89,24 +86,24 @@ fn the_error_that_is_asked_for_is_reached_and_true() {
 #[test]
 fn a_round_that_misses_is_followed_by_a_finer_one() {
     // organs of one small triangle each are met by few lines
-    let mut problem = maize(1);
-    let scene = &mut problem.scene;
-    let organs = scene.triangles.len() as u32;
-    scene.organs = (0..organs)
-        .map(|k| nestrad_common::scene::Organ {
+    let mut scenery = maize(1);
+    scenery.organs.clear();
+    for (k, triangle) in scenery.triangles.iter_mut().enumerate() {
+        triangle.organ = k as u32;
+        scenery.organs.push(Organ {
             id: k.to_string(),
             plant: "0".to_owned(),
-        })
-        .collect();
-    scene.organ = (0..organs).collect();
+        });
+    }
+    let scene = scenery.scene();
     let once = Settings {
         in_rounds: false,
         ..asked(1.0)
     };
-    let accuracy = reach(&problem, &once).accuracy;
+    let accuracy = reach(&scene, &once).accuracy;
     assert_eq!(accuracy.ended, Ended::NotAsked, "{accuracy:?}");
     assert_eq!(accuracy.rounds.len(), 1);
-    let reached = reach(&problem, &asked(1.0));
+    let reached = reach(&scene, &asked(1.0));
     let accuracy = &reached.accuracy;
     assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
     assert!(accuracy.rounds.len() > 1, "{accuracy:?}");
@@ -120,7 +117,7 @@ fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
         budget_s: Some(1e-6),
         ..asked(0.1)
     };
-    let accuracy = reach(&maize(1), &settings).accuracy;
+    let accuracy = reach(&maize(1).scene(), &settings).accuracy;
     assert_eq!(accuracy.ended, Ended::OutOfTime);
     assert_eq!(accuracy.rounds.len(), 1);
     assert!(accuracy.rounds[0].reached_percent.unwrap() > 0.1);
@@ -129,21 +126,22 @@ fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
 
 #[test]
 fn without_memory_the_best_that_fits_has_to_do() {
-    let problem = maize(1);
+    let scene = maize(1).scene();
     let settings = Settings {
         budget_s: Some(1e6),
-        memory_GiB: 1.05 * plan(&problem, &asked(0.4)).memory.total_GiB(),
+        memory_GiB: 1.05 * plan(&scene, &asked(0.4)).memory.total_GiB(),
         ..asked(0.1)
     };
-    let accuracy = reach(&problem, &settings).accuracy;
+    let accuracy = reach(&scene, &settings).accuracy;
     assert_eq!(accuracy.ended, Ended::BeyondLimits, "{accuracy:?}");
 }
 
 #[test]
 fn the_dark_has_no_error() {
-    let mut problem = maize(1);
-    problem.sources.clear();
-    let reached = reach(&problem, &Settings::default());
+    let mut scenery = maize(1);
+    scenery.sources.clear();
+    let scene = scenery.scene();
+    let reached = reach(&scene, &Settings::default());
     assert_eq!(reached.accuracy.ended, Ended::Reached);
     assert!(reached.accuracy.errors.is_empty());
 }
@@ -152,8 +150,8 @@ fn the_dark_has_no_error() {
 #[test]
 fn a_coarse_look_comes_first_where_it_saves() {
     let leaves = small_leaves(2.0, LeafAngles::Spherical, 0.0025, 4);
-    let problem = problem(&leaves, &par_and_nir(), uniform_sky(46, 2));
-    let reached = reach(&problem, &asked(0.3));
+    let scene = scenery(&leaves, &par_and_nir(), uniform_sky(46, 2)).scene();
+    let reached = reach(&scene, &asked(0.3));
     let accuracy = &reached.accuracy;
     assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
     let (look, pilot) = (accuracy.rounds[0].planned, Aims::pilot(0.3));
@@ -164,11 +162,11 @@ fn a_coarse_look_comes_first_where_it_saves() {
     assert!(own > without, "{own} {without}");
     // where what is planned does not fit, what the look comes to has to do
     let little = Settings {
-        memory_GiB: 0.8 * plan(&problem, &asked(0.3)).memory.total_GiB(),
+        memory_GiB: 0.8 * plan(&scene, &asked(0.3)).memory.total_GiB(),
         ..asked(0.3)
     };
-    assert!(Plan::new(&problem, &little).is_err());
-    let accuracy = reach(&problem, &little).accuracy;
+    assert!(try_plan(&scene, &little).is_err());
+    let accuracy = reach(&scene, &little).accuracy;
     assert_eq!(accuracy.ended, Ended::BeyondLimits, "{accuracy:?}");
     assert_eq!(accuracy.rounds.len(), 1, "{accuracy:?}");
 }
@@ -179,8 +177,8 @@ fn a_coarse_look_comes_first_where_it_saves() {
 fn small_leaves_need_no_second_round() {
     for leaf_m2 in [0.0025, 0.0004] {
         let leaves = small_leaves(2.0, LeafAngles::Spherical, leaf_m2, 4);
-        let problem = problem(&leaves, &par_and_nir(), uniform_sky(46, 2));
-        let accuracy = reach(&problem, &asked(1.0)).accuracy;
+        let scene = scenery(&leaves, &par_and_nir(), uniform_sky(46, 2)).scene();
+        let accuracy = reach(&scene, &asked(1.0)).accuracy;
         assert_eq!(accuracy.ended, Ended::Reached, "{accuracy:?}");
         assert_eq!(accuracy.rounds.len(), 1, "{accuracy:?}");
         // nor is more done than is needed

@@ -5,40 +5,54 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::{DVec2, DVec3};
-use nestrad_common::problem::Problem;
-use nestrad_master::direct::{DirectError, direct_light};
-use nestrad_master::output::progress::Cancelled;
-use nestrad_master::plan::Settings;
+use nestrad_common::light::Sources;
+use nestrad_common::scene::Scene;
+use nestrad_engine::direct::direct_light;
+use nestrad_engine::frame::Frame;
+use nestrad_engine::plan::Settings;
+use nestrad_engine::stop::Stopped;
 use nestrad_tests::enclosure::full_plate;
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{plan, solve};
+use nestrad_tests::solving::{frame, plan, solve};
 use nestrad_tests::statistics::{assert_close, assert_within, mean_and_deviation};
 
 /// What organs absorb of direct light, by lattices of lines of that pitch: mean over 16 seeds and its
 /// standard error, W.
-fn absorbed(problem: &Problem, pitch_m: f64) -> Vec<(f64, f64)> {
-    let world = plan(problem, &Settings::default()).world(problem);
-    let areas = vec![pitch_m * pitch_m; problem.sources.len()];
+fn absorbed(scene: &Scene, pitch_m: f64) -> Vec<(f64, f64)> {
+    let (frame, sources) = framed(scene);
+    let optics = frame.ordered(&scene.optics);
+    let areas = vec![pitch_m * pitch_m; sources.list.len()];
     let runs: Vec<Vec<f64>> = (1..=16)
         .map(|seed| {
-            let direct = direct_light(problem, &world, &areas, seed, || Ok(())).unwrap();
-            let mut organs = vec![0.0; problem.scene.organs.len()];
-            for (e, &t) in world.triangle_of_element.iter().enumerate() {
+            let projections = (&sources, &areas[..]);
+            let direct = direct_light(&frame, &optics, projections, seed, || Ok(())).unwrap();
+            let mut organs = vec![0.0; frame.organs];
+            for (e, &t) in frame.triangle_of_element.iter().enumerate() {
                 // black on both faces
                 let both = direct.irradiance_W_m2[2 * e] + direct.irradiance_W_m2[2 * e + 1];
-                organs[problem.scene.organ[t as usize] as usize] +=
-                    both * world.elements.area_m2[e];
+                let organ = frame.order.organ[frame.organ[t as usize] as usize];
+                organs[organ as usize] += both * frame.area_m2[e];
             }
             organs
         })
         .collect();
-    (0..problem.scene.organs.len())
+    (0..frame.organs)
         .map(|o| {
             let values: Vec<f64> = runs.iter().map(|run| run[o]).collect();
             let (mean, deviation) = mean_and_deviation(&values);
             (mean, deviation / 4.0)
         })
         .collect()
+}
+
+/// A scene in its frame, as planned, with its sources.
+fn framed(scene: &Scene) -> (Frame, Sources) {
+    let plan = plan(scene, &Settings::default());
+    let sources = Sources {
+        list: scene.light.suns.clone(),
+        sky_directions: 0,
+    };
+    (frame(&scene.canopy, &plan.trace), sources)
 }
 
 /// To the last row of lines: one row of 5 mm is 0.5 % of a plate of a metre.
@@ -51,7 +65,7 @@ fn an_isolated_plate_gets_the_light_of_its_area() {
         scenery.level("marker", DVec3::new(0.5, 0.3, -0.2), DVec2::splat(0.01));
         scenery.band("B", 0.0, &[]);
         scenery.source(from_zenith(zenith, 25.0), 100.0);
-        let (mean, se) = absorbed(&scenery.problem, 0.005)[0];
+        let (mean, se) = absorbed(&scenery.scene(), 0.005)[0];
         // vertical lines on a plate as large as the scene are always as many
         let se = se.max(1e-6);
         assert_close(&format!("zenith {zenith}"), mean, 60.0, se, 4.0, 0.15);
@@ -70,7 +84,7 @@ fn a_vertical_plate_is_lit_on_one_side() {
     );
     scenery.band("B", 0.0, &[]);
     scenery.source(from_zenith(60.0, 40.0), 100.0);
-    let item = solve(&scenery.problem, &Settings::default())
+    let item = solve(&scenery.scene(), &Settings::default())
         .solution
         .organs[0];
     let expected = 100.0 * 60f64.to_radians().tan() * 40f64.to_radians().cos();
@@ -94,7 +108,7 @@ fn the_shadow_of_a_leaf_wraps_around_the_pattern() {
         full_plate(&mut scenery, "leaf 2", 0.1, DVec2::new(0.2, 0.3));
         scenery.band("B", 0.0, &[]);
         scenery.source(from_zenith(zenith, 200.0), 100.0);
-        let found = absorbed(&scenery.problem, 0.001);
+        let found = absorbed(&scenery.scene(), 0.001);
         for (o, expected) in [(0, 6.0), (1, 14.0)] {
             let (mean, se) = found[o];
             let what = format!("leaf {} at {zenith}", o + 1);
@@ -112,15 +126,17 @@ fn what_is_cancelled_stops_at_the_next_source() {
     for k in 0..200 {
         scenery.source(from_zenith(f64::from(k) * 0.4, 25.0), 1.0);
     }
-    let problem = &scenery.problem;
-    let world = plan(problem, &Settings::default()).world(problem);
+    let scene = scenery.scene();
+    let (frame, sources) = framed(&scene);
+    let optics = frame.ordered(&scene.optics);
     let (asked, enough) = (AtomicUsize::new(0), 10);
     let step = || match asked.fetch_add(1, Ordering::Relaxed) {
         before if before < enough => Ok(()),
-        _ => Err(Cancelled),
+        _ => Err(Stopped),
     };
-    let stopped = direct_light(problem, &world, &vec![1e-4; 200], 1, step);
-    assert!(matches!(stopped, Err(DirectError::Cancelled(_))));
+    let projections = (&sources, &[1e-4; 200][..]);
+    let stopped = direct_light(&frame, &optics, projections, 1, step);
+    assert!(matches!(stopped, Err(Stopped)));
     // one source more of each group that was at work
     assert!(asked.into_inner() < enough + 16);
 }

@@ -4,29 +4,28 @@
 #![allow(clippy::unwrap_used)]
 #![allow(clippy::print_stderr, reason = "the figures are worth reading")]
 
-use nestrad_common::generate::{LeafAngles, LeafShape, RandomCanopy};
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Estimator, Settings};
-use nestrad_master::run::Finished;
-use nestrad_master::solution::Balance;
-use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
+use nestrad_common::generate::{Generated, LeafAngles, LeafShape, RandomCanopy};
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::{Estimator, Settings};
+use nestrad_engine::solution::Balance;
+use nestrad_kernel::ends::Side;
+use nestrad_tests::canopies::{par_and_nir, scenery, small_maize, uniform_sky};
 use nestrad_tests::form_factor::Traced;
-use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{by, coarse, finish, plan, sampling};
+use nestrad_tests::scenery::from_zenith;
+use nestrad_tests::solving::{Solved, by, coarse, finish, plan, sampling};
 use nestrad_tests::statistics::{mean_and_deviation, median};
 
-fn lit(problem: Problem) -> Problem {
-    let mut scenery = Scenery { problem };
-    scenery.problem.sources = uniform_sky(8, 2);
+fn lit(generated: &Generated) -> Scene {
+    let mut scenery = scenery(generated, &par_and_nir(), uniform_sky(8, 2));
     scenery.source(from_zenith(40.0, 160.0), 400.0);
-    scenery.problem
+    scenery.scene()
 }
 
-fn maize() -> Problem {
-    lit(problem(&small_maize(), &par_and_nir(), Vec::new()))
+fn maize() -> Scene {
+    lit(&small_maize())
 }
 
-fn discs() -> Problem {
+fn discs() -> Scene {
     let canopy = RandomCanopy {
         leaf_area_index: 3.0,
         angles: LeafAngles::Planophile,
@@ -36,37 +35,32 @@ fn discs() -> Problem {
         height_m: 0.5,
         seed: 2,
     };
-    lit(problem(
-        &canopy.generate().unwrap(),
-        &par_and_nir(),
-        Vec::new(),
-    ))
+    lit(&canopy.generate().unwrap())
 }
 
-fn solved(problem: &Problem, estimator: Estimator, rays: f64, seed: u64) -> Finished {
+fn solved(scene: &Scene, estimator: Estimator, rays: f64, seed: u64) -> Solved {
     let settings = Settings {
         seed,
         ..by(estimator)
     };
-    let mut plan = plan(problem, &settings);
-    if let (Estimator::Rays, Some(sampling)) = (estimator, &mut plan.sampling) {
+    let mut plan = plan(scene, &settings);
+    if let (Estimator::Rays, Some(sampling)) = (estimator, &mut plan.trace.sampling) {
         sampling.least_samples = rays;
     }
-    finish(problem, &plan).unwrap()
+    finish(scene, &plan).unwrap()
 }
 
 /// Of 360 values of discs, 0 to 4 are beyond 3 standard errors from seed to seed: three seeds together.
 #[test]
 fn lines_and_rays_agree() {
-    for (name, problem, rays, seeds) in [("maize", maize(), 128.0, 1), ("discs", discs(), 256.0, 3)]
-    {
+    for (name, scene, rays, seeds) in [("maize", maize(), 128.0, 1), ("discs", discs(), 256.0, 3)] {
         let (mut beyond, mut organs) = (0, 0);
         for seed in 1..=seeds {
-            let lines = solved(&problem, Estimator::Lines, 0.0, seed).solution;
-            let rays = solved(&problem, Estimator::Rays, rays, seed).solution;
+            let lines = solved(&scene, Estimator::Lines, 0.0, seed).solution;
+            let rays = solved(&scene, Estimator::Rays, rays, seed).solution;
             for b in 0..2 {
                 balances_agree(name, &lines.balance[b], &rays.balance[b]);
-                for o in 0..problem.scene.organs.len() {
+                for o in 0..scene.canopy.organs.len() {
                     let (l, r) = (&lines.organs[2 * o + b], &rays.organs[2 * o + b]);
                     // both share the direct light, lattice and all
                     let se = l.absorbed_se_W.hypot(r.absorbed_se_W);
@@ -98,26 +92,21 @@ fn balances_agree(name: &str, lines: &Balance, rays: &Balance) {
 /// A(i) F(i,j) of one half of the lines is A(j) F(j,i) of the other half within their errors.
 #[test]
 fn exchange_of_two_organs_is_mutual() {
-    let problem = maize();
+    let scene = maize();
     let sampling = sampling(Estimator::Lines, 0.006, 0.0);
-    let traced = Traced::new(&problem, 0.05, &sampling);
-    let organs = problem.scene.organs.len();
-    let sides = [
-        nestrad_common::ends::Side::Upper,
-        nestrad_common::ends::Side::Lower,
-    ];
+    let traced = Traced::new(&scene.canopy, 0.05, &sampling);
+    let organs = scene.canopy.organs.len();
+    let sides = [Side::Upper, Side::Lower];
     let (mut z, mut beyond) = (Vec::new(), 0);
     for i in 0..organs {
         for j in 0..i {
             for (s, t) in sides.iter().flat_map(|s| sides.map(|t| (*s, t))) {
                 let (from, to) = (traced.rows(i, s), traced.rows(j, t));
-                if solid(&problem, &traced, i) || solid(&problem, &traced, j) {
+                if traced.is_solid(i) || traced.is_solid(j) {
                     continue;
                 }
                 let area = |rows: &[usize]| -> f64 {
-                    rows.iter()
-                        .map(|&r| traced.world.row_area_m2(r as u32))
-                        .sum()
+                    rows.iter().map(|&r| traced.frame.row_area_m2(r)).sum()
                 };
                 let there = traced.part_seen(&from, &[0], |end| traced.is(end, j, t));
                 let back = traced.part_seen(&to, &[1], |end| traced.is(end, i, s));
@@ -145,25 +134,16 @@ fn exchange_of_two_organs_is_mutual() {
     assert!(100 * beyond <= z.len(), "{beyond} of {}", z.len());
 }
 
-fn solid(problem: &Problem, traced: &Traced, organ: usize) -> bool {
-    let of = problem
-        .scene
-        .organ
-        .iter()
-        .position(|&o| o as usize == organ);
-    traced.world.solid[of.unwrap()]
-}
-
 /// Over 20 seeds: rms of (value - mean) / stated error, for the median organ.
 #[test]
 fn stated_errors_are_true() {
     const SEEDS: u64 = 20;
-    let problem = discs();
-    let (organs, bands) = (problem.scene.organs.len(), problem.bands.len());
-    let runs: Vec<Finished> = (1..=SEEDS)
+    let scene = discs();
+    let (organs, bands) = (scene.canopy.organs.len(), scene.optics.len());
+    let runs: Vec<Solved> = (1..=SEEDS)
         .map(|seed| {
             let settings = Settings { seed, ..coarse() };
-            finish(&problem, &plan(&problem, &settings)).unwrap()
+            finish(&scene, &plan(&scene, &settings)).unwrap()
         })
         .collect();
     for b in 0..bands {

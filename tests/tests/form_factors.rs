@@ -5,8 +5,8 @@
 use std::f64::consts::{PI, TAU};
 
 use glam::{DVec2, DVec3};
-use nestrad_common::ends::Side::{Lower, Upper};
-use nestrad_master::plan::Estimator;
+use nestrad_engine::plan::Estimator;
+use nestrad_kernel::ends::Side::{Lower, Upper};
 use nestrad_tests::enclosure::sphere;
 use nestrad_tests::form_factor::Traced;
 use nestrad_tests::scenery::Scenery;
@@ -19,7 +19,7 @@ fn trace(scenery: &Scenery, edge_m: f64, estimator: Estimator) -> Traced {
     let elements = scenery.elements(edge_m) as f64 / 2.0;
     let mut sampling = sampling(estimator, 0.04, 200_000.0 / elements);
     sampling.sets_per_batch *= 8;
-    Traced::new(&scenery.problem, edge_m, &sampling)
+    Traced::new(&scenery.canopy(), edge_m, &sampling)
 }
 
 /// Elements of a surface of about a metre: several per triangle, so that pieces take part.
@@ -143,7 +143,7 @@ fn inside_of_a_sphere_everything_sees_area_alone() {
     for estimator in ESTIMATORS {
         let traced = trace(&scenery, 1.0, estimator);
         let area = |o: usize| -> f64 {
-            let of = |&row: &usize| traced.world.row_area_m2(row as u32);
+            let of = |&row: &usize| traced.frame.row_area_m2(row);
             traced.rows(o, Lower).iter().map(of).sum()
         };
         let whole: f64 = (0..8).map(area).sum();
@@ -156,7 +156,7 @@ fn inside_of_a_sphere_everything_sees_area_alone() {
                 assert_within(&what, f.value, area(to) / whole, 4.0 * f.se + of_itself);
             }
             let rows = traced.rows(from, Lower);
-            let out = traced.part_seen(&rows, &[0, 1], |end| end >= traced.world.ends.sky());
+            let out = traced.part_seen(&rows, &[0, 1], |end| end >= traced.frame.ends.sky());
             assert_eq!(out.value, 0.0, "{estimator:?}: a closed sphere leaks");
         }
     }

@@ -4,13 +4,15 @@
 
 #![allow(clippy::unwrap_used)]
 
-use std::cell::Cell;
+use std::thread;
+use std::time::Duration;
 
 use glam::{DVec2, DVec3};
-use nestrad_common::ends::Side;
 use nestrad_common::optics::{FaceOptics, LeafOptics};
-use nestrad_master::output::progress::Cancelled;
-use nestrad_master::solver::{Irradiance, SolveError, Step, System, Tolerance};
+use nestrad_engine::exchange::Outlook;
+use nestrad_engine::solver::{Groups, Irradiance, SolverError, System, Tolerance, solve};
+use nestrad_engine::stop::Stop;
+use nestrad_kernel::ends::Side;
 use nestrad_tests::enclosure::{closed_box, sphere};
 use nestrad_tests::form_factor::Traced;
 use nestrad_tests::scenery::Scenery;
@@ -22,8 +24,12 @@ use nestrad_tests::statistics::assert_within;
 /// All light that reaches a face counts, so unit irradiance everywhere is what unit emission of
 /// everything brings: E = 1 + rho E.
 fn heated(scenery: &Scenery, traced: &Traced, lit: &[usize]) -> Vec<f64> {
-    let irradiance = solved(scenery, traced, lit, &|| Ok(())).unwrap();
-    (0..traced.world.rows())
+    let tolerance = Tolerance {
+        absorbed: 1e-7,
+        most_passes: 1000,
+    };
+    let irradiance = solved(scenery, traced, lit, &tolerance, &Stop::default()).unwrap();
+    (0..traced.frame.rows())
         .map(|row| irradiance.mean(row, 0))
         .collect()
 }
@@ -32,47 +38,53 @@ fn solved(
     scenery: &Scenery,
     traced: &Traced,
     lit: &[usize],
-    step: Step,
-) -> Result<Irradiance, SolveError> {
-    let (world, exchange) = (&traced.world, &traced.exchange);
-    let mut direct = vec![0.0; world.rows()];
+    tolerance: &Tolerance,
+    stop: &Stop,
+) -> Result<Irradiance, SolverError> {
+    let (frame, exchange) = (&traced.frame, &traced.exchange);
+    let mut direct = vec![0.0; frame.rows()];
     for &row in lit {
         direct[row] = 1.0;
     }
-    let fixed = vec![0.0; world.ends.len() - world.rows()];
-    let outlook = exchange.outlook(world, |_| false);
-    let tolerance = Tolerance {
-        absorbed: 1e-7,
-        most_passes: 1000,
-    };
+    let fixed = vec![0.0; frame.ends.len() - frame.rows()];
     let system = System {
-        problem: &scenery.problem,
-        world,
+        frame,
+        optics: &frame.ordered(&scenery.scene().optics),
         exchange,
-        outlook: &outlook,
+        outlook: &Outlook::of(frame, exchange),
+        groups: &Groups::of(frame),
         far: None,
         direct_W_m2: &direct,
         fixed_W_m2: &fixed,
         incoming_W: &[1.0],
         far_sample: None,
     };
-    system.solve(&[0], &tolerance, step)
+    solve(&system, &[0], tolerance, stop)
 }
 
 #[test]
 fn what_is_cancelled_stops_at_the_next_pass() {
     let mut scenery = sphere(2);
     scenery.band("B", 0.0, &[("wall", LeafOptics::opaque(0.9))]);
-    let traced = Traced::new(&scenery.problem, 0.2, &sampling(ESTIMATORS[0], 0.02, 40.0));
-    let asked = Cell::new(0);
-    let step = || match asked.replace(asked.get() + 1) {
-        0..3 => Ok(()),
-        _ => Err(Cancelled),
+    let traced = Traced::new(&scenery.canopy(), 0.2, &sampling(ESTIMATORS[0], 0.02, 40.0));
+    let rows: Vec<usize> = (0..traced.frame.rows()).collect();
+    // nothing is ever as good as this: the passes have no other end
+    let never = Tolerance {
+        absorbed: -1.0,
+        most_passes: u32::MAX,
     };
-    let rows: Vec<usize> = (0..traced.world.rows()).collect();
-    let stopped = solved(&scenery, &traced, &rows, &step);
-    assert!(matches!(stopped, Err(SolveError::Cancelled(_))));
-    assert_eq!(asked.get(), 4);
+    let stop = Stop::default();
+    let stopped = thread::scope(|scope| {
+        scope.spawn(|| {
+            thread::sleep(Duration::from_millis(50));
+            stop.stop();
+        });
+        solved(&scenery, &traced, &rows, &never, &stop)
+    });
+    assert!(matches!(stopped, Err(SolverError::Stopped(_))));
+    // and what is told so beforehand does not begin
+    let stopped = solved(&scenery, &traced, &rows, &never, &stop);
+    assert!(matches!(stopped, Err(SolverError::Stopped(_))));
 }
 
 #[test]
@@ -84,11 +96,11 @@ fn in_a_furnace_every_wall_is_equally_bright() {
         ("sphere", sphere(3), Side::Lower),
     ] {
         for rho in [0.2, 0.5, 0.9] {
-            scenery.problem.bands.clear();
+            scenery.bands.clear();
             scenery.band("B", 0.0, &[("wall", LeafOptics::opaque(rho))]);
             for estimator in ESTIMATORS {
-                let traced = Traced::new(&scenery.problem, 0.2, &sampling(estimator, 0.02, 40.0));
-                let inside: Vec<usize> = (0..scenery.problem.scene.organs.len())
+                let traced = Traced::new(&scenery.canopy(), 0.2, &sampling(estimator, 0.02, 40.0));
+                let inside: Vec<usize> = (0..scenery.organs.len())
                     .flat_map(|organ| traced.rows(organ, side))
                     .collect();
                 let irradiance = heated(&scenery, &traced, &inside);
@@ -128,7 +140,7 @@ fn two_sided_leaves_in_a_furnace_are_as_bright_as_its_walls() {
         &[("wall", LeafOptics::opaque(scattered)), ("leaf", leaf)],
     );
     for estimator in ESTIMATORS {
-        let traced = Traced::new(&scenery.problem, 0.2, &sampling(estimator, 0.02, 40.0));
+        let traced = Traced::new(&scenery.canopy(), 0.2, &sampling(estimator, 0.02, 40.0));
         let mut lit: Vec<usize> = (0..6).flat_map(|o| traced.rows(o, Side::Upper)).collect();
         for leaf in [6, 7] {
             lit.extend(traced.rows(leaf, Side::Upper));

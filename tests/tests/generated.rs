@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, reason = "what cannot be set up fails the test")]
 
+use std::num::NonZeroUsize;
+
 use nestrad_common::assemble::{load, load_scene_file};
 use nestrad_common::generate::{Bean, Generated, Maize, RandomCanopy};
 
@@ -11,9 +13,10 @@ fn loads_without_a_warning(canopy: Generated) {
     let inputs = load_scene_file(&folder.path().join("scene.toml")).unwrap();
     let loaded = load(&inputs).unwrap();
     assert_eq!(loaded.inspection.warnings, [""; 0]);
-    assert_eq!(loaded.problem.scene.triangles.len(), canopy.triangles.len());
-    assert_eq!(loaded.problem.bands.len(), 2);
-    assert!(!loaded.problem.sources.is_empty());
+    assert_eq!(loaded.scene.canopy.len(), canopy.triangles.len());
+    assert_eq!(loaded.scene.optics.len(), 2);
+    let sources = loaded.scene.light.sources(NonZeroUsize::MIN, 1);
+    assert!(!sources.list.is_empty());
 }
 
 #[test]

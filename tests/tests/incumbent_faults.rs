@@ -4,13 +4,12 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::{DVec2, DVec3};
-use nestrad_common::ends::Side::{Lower, Upper};
 use nestrad_common::optics::LeafOptics;
 use nestrad_common::options::Unit;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Estimator, Settings};
-use nestrad_master::solution::Solution;
-use nestrad_tests::canopies::{par_and_nir, problem, small_maize};
+use nestrad_engine::plan::{Estimator, Settings};
+use nestrad_engine::solution::Solution;
+use nestrad_kernel::ends::Side::{Lower, Upper};
+use nestrad_tests::canopies::{par_and_nir, scenery, small_maize};
 use nestrad_tests::enclosure::full_plate;
 use nestrad_tests::files::Written;
 use nestrad_tests::form_factor::Traced;
@@ -101,36 +100,34 @@ fn light_does_not_vanish_far_from_the_origin() {
 #[test]
 fn a_second_band_is_solved_like_a_first_one() {
     let sky = |bands: usize| {
-        let mut scenery = Scenery {
-            problem: problem(&small_maize(), &par_and_nir()[..bands], Vec::new()),
-        };
+        let mut scenery = scenery(&small_maize(), &par_and_nir()[..bands], Vec::new());
         scenery.source(from_zenith(35.0, 20.0), 300.0);
         scenery.source(from_zenith(10.0, 200.0), 100.0);
-        scenery.problem
+        scenery
     };
     let both = sky(2);
     // as an unequal pair: the first band gets 7 times the light of the second one
-    let lit = |mut problem: Problem| {
-        for source in &mut problem.sources {
+    let lit = |mut scenery: Scenery| {
+        for source in &mut scenery.sources {
             if let [first, _] = &mut source.irradiance_W_m2[..] {
                 *first *= 7.0;
             }
         }
-        problem
+        scenery
     };
     let settings = Settings {
         diameter: nestrad_common::options::Diameter::Metres(0.5),
         ..Settings::default()
     };
     let both = lit(both);
-    let together = solve(&both, &settings).solution;
+    let together = solve(&both.scene(), &settings).solution;
     for band in 0..2 {
         let mut alone = both.clone();
         alone.bands = vec![both.bands[band].clone()];
         for source in &mut alone.sources {
             source.irradiance_W_m2 = vec![source.irradiance_W_m2[band]];
         }
-        let alone = solve(&alone, &settings).solution;
+        let alone = solve(&alone.scene(), &settings).solution;
         let largest = absorbed(&alone).into_iter().fold(0.0, f64::max);
         for (o, item) in alone.organs.iter().enumerate() {
             let with = together.organs[2 * o + band].absorbed_W;
@@ -158,7 +155,7 @@ fn triangles_of_one_flat_leaf_do_not_see_each_other() {
         ],
     );
     for estimator in ESTIMATORS {
-        let traced = Traced::new(&scenery.problem, 0.2, &sampling(estimator, 0.01, 1000.0));
+        let traced = Traced::new(&scenery.canopy(), 0.2, &sampling(estimator, 0.01, 1000.0));
         for from in [Upper, Lower] {
             for to in [Upper, Lower] {
                 let f = traced.form_factor((0, from), (0, to));
@@ -183,7 +180,7 @@ fn form_factors_are_not_those_of_the_centroid() {
             let rays = 4e5 / scenery.elements(edge) as f64;
             let mut sampling = sampling(estimator, 0.02, rays);
             sampling.sets_per_batch *= 4;
-            let traced = Traced::new(&scenery.problem, edge, &sampling);
+            let traced = Traced::new(&scenery.canopy(), edge, &sampling);
             let f = traced.form_factor((0, Upper), (1, Lower));
             let what = format!("{estimator:?}, edges of {edge}");
             assert_close(&what, f.value, expected, f.se, 4.0, 2e-3);
@@ -220,7 +217,7 @@ fn an_emitter_that_crosses_the_receivers_plane_is_seen_from_both_sides() {
             let rays = 4e5 / scenery.elements(edge) as f64;
             let mut sampling = sampling(estimator, 0.02, rays);
             sampling.sets_per_batch *= 4;
-            let traced = Traced::new(&scenery.problem, edge, &sampling);
+            let traced = Traced::new(&scenery.canopy(), edge, &sampling);
             for side in [Upper, Lower] {
                 let f = traced.form_factor((0, side), (1, Lower));
                 let what = format!("{estimator:?} {side:?}, edges of {edge}");
@@ -258,7 +255,7 @@ fn what_hangs_over_the_edge_of_the_pattern_keeps_its_light() {
             scenery.level("leaf small", offset.extend(0.3), DVec2::new(0.4, 0.3));
             scenery.band("B", 0.0, &[]);
             scenery.source(from_zenith(zenith, 30.0), 100.0);
-            let solution = solve(&scenery.problem, &Settings::default()).solution;
+            let solution = solve(&scenery.scene(), &Settings::default()).solution;
             let small = solution.organs[scenery.organ("leaf small")].absorbed_W;
             // counted in lines of 2.4 mm: half a line along the outline
             assert_within("what leans out", small, 100.0 * 0.12, 100.0 * 1.4 * 0.0012);
@@ -281,11 +278,9 @@ fn rho_equal_to_tau_and_rho_of_zero_are_nothing_special() {
         (leaf(0.0, 0.9), leaf(1e-7, 0.9)),
     ] {
         let solved = |leaf| {
-            let mut scenery = Scenery {
-                problem: problem(&canopy, &[leaf], Vec::new()),
-            };
+            let mut scenery = scenery(&canopy, &[leaf], Vec::new());
             scenery.source(from_zenith(30.0, 70.0), 100.0);
-            solve(&scenery.problem, &by(Estimator::Lines)).solution
+            solve(&scenery.scene(), &by(Estimator::Lines)).solution
         };
         let (at_it, near_it) = (solved(at), solved(near));
         assert_same(&at_it, &near_it, 1e-5);

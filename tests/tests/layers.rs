@@ -5,10 +5,10 @@
 
 use nestrad_common::generate::LeafAngles;
 use nestrad_common::optics::LeafOptics;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::Estimator;
-use nestrad_tests::canopies::{problem, small_leaves, uniform_sky};
-use nestrad_tests::scenery::{Scenery, from_zenith};
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::Estimator;
+use nestrad_tests::canopies::{scenery, small_leaves, uniform_sky};
+use nestrad_tests::scenery::from_zenith;
 use nestrad_tests::solving::{Shares, by, finish, plan, sampling, shares};
 use nestrad_tests::statistics::assert_within;
 
@@ -17,15 +17,15 @@ use nestrad_tests::statistics::assert_within;
 /// 7500 leaves is one of many.
 const SMALL: f64 = 0.003;
 
-fn solved(problem: &Problem, estimator: Estimator) -> Vec<Shares> {
-    let mut plan = plan(problem, &by(estimator));
-    if let Some(planned) = &mut plan.sampling {
+fn solved(scene: &Scene, estimator: Estimator) -> Vec<Shares> {
+    let mut plan = plan(scene, &by(estimator));
+    if let Some(planned) = &mut plan.trace.sampling {
         *planned = sampling(estimator, 0.01, 48.0);
     }
     // leaves of 2 cm are not to be cut: there are thousands
-    (plan.max_edge_m, plan.direct_line_area_m2) = (0.03, 0.006 * 0.006);
-    let solution = finish(problem, &plan).unwrap().solution;
-    (0..problem.bands.len())
+    (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.03, 0.006 * 0.006);
+    let solution = finish(scene, &plan).unwrap().solution;
+    (0..scene.optics.len())
         .map(|b| shares(&solution, b))
         .collect()
 }
@@ -51,9 +51,9 @@ fn horizontal_leaves_follow_kubelka_and_munk() {
     }
     let leaf = LeafOptics::symmetric(0.3912, 0.4146);
     let canopy = small_leaves(3.0, LeafAngles::Horizontal, 4e-4, 5);
-    let problem = problem(&canopy, &[(leaf, 0.2142)], uniform_sky(12, 1));
+    let scene = scenery(&canopy, &[(leaf, 0.2142)], uniform_sky(12, 1)).scene();
     for estimator in [Estimator::Lines, Estimator::Rays] {
-        let found = solved(&problem, estimator)[0];
+        let found = solved(&scene, estimator)[0];
         eprintln!("{estimator:?}: {found:.5?}, expected {r:.5} {t:.5} {a:.5}");
         assert_within("reflected", found.up, r, SMALL);
         assert_within("reached", found.soil / (1.0 - 0.2142), t, SMALL);
@@ -68,8 +68,8 @@ fn conservative_horizontal_leaves_send_back_what_the_soil_does_not_take() {
     let canopy = small_leaves(3.0, LeafAngles::Horizontal, 4e-4, 6);
     let white = LeafOptics::symmetric(0.5, 0.5);
     let soils = [0.0, 0.4];
-    let problem = problem(&canopy, &soils.map(|s| (white, s)), uniform_sky(12, 2));
-    let found = solved(&problem, Estimator::Lines);
+    let scene = scenery(&canopy, &soils.map(|s| (white, s)), uniform_sky(12, 2)).scene();
+    let found = solved(&scene, Estimator::Lines);
     for (s, found) in soils.into_iter().zip(found) {
         let thick = (1.0 - s) * 0.5 * 3.0;
         let expected = (s + thick) / (1.0 + thick);
@@ -86,8 +86,8 @@ fn where_nothing_absorbs_all_light_comes_back() {
     for (rho, tau) in [(0.5, 0.5), (0.1, 0.9), (1.0, 0.0)] {
         let canopy = small_leaves(1.0, LeafAngles::Spherical, 4e-3, 7);
         let white = LeafOptics::symmetric(rho, tau);
-        let problem = problem(&canopy, &[(white, 1.0)], uniform_sky(6, 1));
-        let found = solved(&problem, Estimator::Lines)[0];
+        let scene = scenery(&canopy, &[(white, 1.0)], uniform_sky(6, 1)).scene();
+        let found = solved(&scene, Estimator::Lines)[0];
         assert_within(
             &format!("albedo of rho {rho} tau {tau}"),
             found.up,
@@ -106,13 +106,11 @@ fn black_spherical_leaves_let_a_beam_through_exponentially() {
         let canopy = small_leaves(lai, LeafAngles::Spherical, 1e-4, 8);
         for zenith in [0.0, 40.0, 60.0] {
             // a beam sees one canopy; from several sides it sees it several times
-            let mut scenery = Scenery {
-                problem: problem(&canopy, &[(black, 0.0)], Vec::new()),
-            };
+            let mut scenery = scenery(&canopy, &[(black, 0.0)], Vec::new());
             for side in 0..6 {
                 scenery.source(from_zenith(zenith, 60.0 * f64::from(side) + 10.0), 1.0);
             }
-            let found = solved(&scenery.problem, Estimator::Lines)[0];
+            let found = solved(&scenery.scene(), Estimator::Lines)[0];
             let gap = (-lai / (2.0 * zenith.to_radians().cos())).exp();
             eprintln!(
                 "LAI {lai} zenith {zenith}: {:.5}, expected {gap:.5}",
@@ -130,8 +128,8 @@ fn black_spherical_leaves_intercept_a_uniform_sky() {
     for (lai, expected) in [(1.0, 0.556_791), (2.0, 0.780_616), (3.0, 0.886_521)] {
         let canopy = small_leaves(lai, LeafAngles::Spherical, 1e-4, 9);
         let black = (LeafOptics::default(), 0.0);
-        let problem = problem(&canopy, &[black], uniform_sky(64, 1));
-        let found = solved(&problem, Estimator::Lines)[0];
+        let scene = scenery(&canopy, &[black], uniform_sky(64, 1)).scene();
+        let found = solved(&scene, Estimator::Lines)[0];
         eprintln!("LAI {lai}: {:.5}, expected {expected:.5}", found.plants);
         assert_within("intercepted", found.plants, expected, SMALL);
     }

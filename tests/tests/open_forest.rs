@@ -15,8 +15,8 @@ use std::fs;
 use glam::{DVec2, DVec3};
 use nestrad_common::light::Source;
 use nestrad_common::optics::LeafOptics;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::Settings;
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::Settings;
 use nestrad_tests::random::Dice;
 use nestrad_tests::reference::shared;
 use nestrad_tests::scenery::{Scenery, from_zenith};
@@ -106,21 +106,20 @@ fn forest(leaf_area_index: f64, seed: u64) -> Scenery {
 }
 
 /// All cases at once: a band each, with a beam of its own.
-fn problem(cases: &[Published], seed: u64) -> Problem {
+fn scene(cases: &[Published], seed: u64) -> Scene {
     let mut forest = forest(cases[0].leaf_area_index, seed);
     for case in cases {
         forest.band(&case.name, case.soil_albedo, &[("leaf", case.leaf)]);
     }
-    let mut problem = forest.problem;
     for (k, case) in cases.iter().enumerate() {
         let mut irradiance_W_m2 = vec![0.0; cases.len()];
         irradiance_W_m2[k] = 1000.0;
-        problem.sources.push(Source {
+        forest.sources.push(Source {
             direction: from_zenith(case.zenith_deg, 30.0),
             irradiance_W_m2,
         });
     }
-    problem
+    forest.scene()
 }
 
 #[test]
@@ -132,7 +131,7 @@ fn the_open_forest_has_its_published_fluxes() {
         accuracy_percent: 5.0,
         ..Settings::default()
     };
-    let solution = solve(&problem(&cases, 1), &settings).solution;
+    let solution = solve(&scene(&cases, 1), &settings).solution;
     let mut off = Vec::new();
     eprintln!("case: absorbed, reflected, downward at the ground, less what is published");
     for (band, case) in cases.iter().enumerate() {

@@ -16,10 +16,10 @@ fn check(n: usize, leaf: LeafOptics, soil_albedo: f64) -> f64 {
     let expected = stack(n, leaf, soil_albedo);
     let mut albedo = 0.0;
     for estimator in ESTIMATORS {
-        let mut plan = plan(&scenery.problem, &by(estimator));
+        let mut plan = plan(&scenery.scene(), &by(estimator));
         // elements that are large against the lines are evenly lit: then nothing is left to chance
-        (plan.max_edge_m, plan.direct_line_area_m2) = (0.1, 5e-6);
-        let solution = finish(&scenery.problem, &plan).unwrap().solution;
+        (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.1, 5e-6);
+        let solution = finish(&scenery.scene(), &plan).unwrap().solution;
         let found = shares(&solution, 0);
         let what = |of: &str| format!("{n} plates {leaf:?}, {estimator:?}: {of}");
         assert_within(&what("albedo"), found.up, expected.albedo, STOPPED);

@@ -3,25 +3,23 @@
 #![allow(clippy::unwrap_used)]
 
 use glam::DVec3;
+use nestrad_common::canopy::Triangle;
 use nestrad_common::optics::LeafOptics;
-use nestrad_common::problem::Problem;
-use nestrad_master::exchange::{BlockOf, trace_here};
-use nestrad_master::plan::Settings;
-use nestrad_master::solution::Solution;
-use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
+use nestrad_engine::exchange::BlockOf;
+use nestrad_engine::plan::Settings;
+use nestrad_engine::solution::Solution;
+use nestrad_tests::canopies::{par_and_nir, scenery, small_maize, uniform_sky};
+use nestrad_tests::cutting::InBlocks;
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{ESTIMATORS, coarse, finish, plan, shares, solve};
+use nestrad_tests::solving::{ESTIMATORS, coarse, finish, frame, plan, shares, solve, trace};
 use nestrad_tests::statistics::assert_within;
 use proptest::prelude::*;
 
 /// A small periodic canopy of two bands, a sun and a sky.
-fn maize() -> Problem {
-    let mut scenery = Scenery {
-        problem: problem(&small_maize(), &par_and_nir(), Vec::new()),
-    };
-    scenery.problem.sources = uniform_sky(4, 2);
+fn maize() -> Scenery {
+    let mut scenery = scenery(&small_maize(), &par_and_nir(), uniform_sky(4, 2));
     scenery.source(from_zenith(40.0, 160.0), 400.0);
-    scenery.problem
+    scenery
 }
 
 /// How far the organs of two solutions are apart: rms of difference over combined standard error.
@@ -41,22 +39,22 @@ fn rms_z(a: &Solution, b: &Solution) -> f64 {
 
 #[test]
 fn one_thread_and_two_give_the_same_bits() {
-    let problem = maize();
+    let scene = maize().scene();
     for estimator in ESTIMATORS {
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             pool.build().unwrap().install(|| {
                 let mut plan = plan(
-                    &problem,
+                    &scene,
                     &Settings {
                         estimator,
                         ..coarse()
                     },
                 );
-                if let Some(sampling) = &mut plan.sampling {
+                if let Some(sampling) = &mut plan.trace.sampling {
                     sampling.least_samples = sampling.least_samples.min(16.0);
                 }
-                finish(&problem, &plan).unwrap().solution
+                finish(&scene, &plan).unwrap().solution
             })
         };
         let one = on(1);
@@ -68,12 +66,12 @@ fn one_thread_and_two_give_the_same_bits() {
 /// The scene as one job, or as several that own every third triangle and some soil each.
 #[test]
 fn one_job_and_many_give_the_same_bits() {
-    let problem = maize();
-    let plan = plan(&problem, &coarse());
-    let mut sampling = plan.sampling.unwrap();
+    let scene = maize().scene();
+    let plan = plan(&scene, &coarse());
+    let mut sampling = plan.trace.sampling.unwrap();
     sampling.batches = 2;
-    let world = plan.world(&problem);
-    let whole = BlockOf::whole(&world);
+    let frame = frame(&scene.canopy, &plan.trace);
+    let whole = BlockOf::whole(&frame);
     let parts: Vec<BlockOf> = (0..3)
         .map(|part| BlockOf {
             triangles: whole
@@ -89,20 +87,16 @@ fn one_job_and_many_give_the_same_bits() {
                 .collect(),
         })
         .collect();
-    let of = |blocks: &[BlockOf]| {
-        trace_here(&problem.scene, &world, blocks, &sampling, || Ok(()))
-            .unwrap()
-            .halves
-    };
-    assert!(of(&[whole]) == of(&parts), "rows differ");
+    let of = |blocks: Vec<BlockOf>| trace(&frame, &sampling, &InBlocks(blocks)).halves;
+    assert!(of(vec![whole]) == of(parts), "rows differ");
 }
 
 #[test]
 fn the_same_seed_gives_the_same_bits_and_another_does_not() {
-    let problem = maize();
+    let scene = maize().scene();
     let with = |seed| {
         let settings = Settings { seed, ..coarse() };
-        solve(&problem, &settings).solution
+        solve(&scene, &settings).solution
     };
     let first = with(1);
     assert!(first == with(1));
@@ -112,15 +106,13 @@ fn the_same_seed_gives_the_same_bits_and_another_does_not() {
 /// Direct light alone is sampled, too.
 #[test]
 fn another_seed_samples_a_black_canopy_elsewhere() {
-    let mut problem = problem(
-        &small_maize(),
-        &[(LeafOptics::default(), 0.0)],
-        uniform_sky(2, 1),
-    );
-    problem.bands[0].materials.fill(LeafOptics::default());
+    let black = [(LeafOptics::default(), 0.0)];
+    let mut scenery = scenery(&small_maize(), &black, uniform_sky(2, 1));
+    scenery.bands[0].materials.fill(LeafOptics::default());
+    let scene = scenery.scene();
     let with = |seed| {
         let settings = Settings { seed, ..coarse() };
-        solve(&problem, &settings).solution
+        solve(&scene, &settings).solution
     };
     assert!(with(1).organs != with(2).organs);
 }
@@ -128,11 +120,12 @@ fn another_seed_samples_a_black_canopy_elsewhere() {
 /// A mirrored canopy under mirrored light: with every triangle turned over to keep its upper face up.
 #[test]
 fn a_mirrored_scene_gets_the_same_light() {
-    let problem = maize();
+    let scenery = maize();
     let mirror = |v: DVec3| DVec3::new(-v.x, v.y, v.z);
-    let mut mirrored = problem.clone();
-    for [a, b, c] in &mut mirrored.scene.triangles {
-        (*a, *b, *c) = (mirror(*a), mirror(*c), mirror(*b));
+    let mut mirrored = scenery.clone();
+    for triangle in &mut mirrored.triangles {
+        let [a, b, c] = triangle.corners_m.map(mirror);
+        triangle.corners_m = [a, c, b];
     }
     for source in &mut mirrored.sources {
         source.direction = mirror(source.direction);
@@ -140,8 +133,8 @@ fn a_mirrored_scene_gets_the_same_light() {
     // the pattern is centred on the origin
     let settings = coarse();
     let z = rms_z(
-        &solve(&problem, &settings).solution,
-        &solve(&mirrored, &settings).solution,
+        &solve(&scenery.scene(), &settings).solution,
+        &solve(&mirrored.scene(), &settings).solution,
     );
     assert!(
         (0.5..1.4).contains(&z),
@@ -152,19 +145,17 @@ fn a_mirrored_scene_gets_the_same_light() {
 /// Not in a single bit (`order`).
 #[test]
 fn the_order_of_triangles_means_nothing() {
-    let problem = maize();
-    let mut shuffled = problem.clone();
-    let n = problem.scene.triangles.len();
+    let scenery = maize();
+    let mut shuffled = scenery.clone();
+    let n = scenery.triangles.len();
     // a step without a common divisor goes through all of them
     let step = (n / 2 + 1..).find(|&s| gcd(s, n) == 1).unwrap();
     for (to, from) in (0..n).map(|k| (k, k * step % n)) {
-        shuffled.scene.triangles[to] = problem.scene.triangles[from];
-        shuffled.scene.organ[to] = problem.scene.organ[from];
-        shuffled.scene.material[to] = problem.scene.material[from];
+        shuffled.triangles[to] = scenery.triangles[from];
     }
     let settings = coarse();
-    let a = solve(&problem, &settings).solution;
-    let b = solve(&shuffled, &settings).solution;
+    let a = solve(&scenery.scene(), &settings).solution;
+    let b = solve(&shuffled.scene(), &settings).solution;
     assert!(a.organs == b.organs, "organs differ");
     assert!(a.balance == b.balance, "balances differ");
     for k in 0..n {
@@ -183,12 +174,12 @@ fn gcd(a: usize, b: usize) -> usize {
 /// Turning a triangle over, with the properties of its faces exchanged, exchanges what they get.
 #[test]
 fn a_triangle_turned_over_swaps_its_faces() {
-    let problem = maize();
-    let mut turned = problem.clone();
-    let solid = |p: &Problem, t: usize| p.scene.material[t] == 0;
-    for t in 0..turned.scene.triangles.len() {
-        if !solid(&problem, t) {
-            turned.scene.triangles[t].swap(1, 2);
+    let scenery = maize();
+    let mut turned = scenery.clone();
+    let solid = |triangle: &Triangle| triangle.material == 0;
+    for triangle in &mut turned.triangles {
+        if !solid(triangle) {
+            triangle.corners_m.swap(1, 2);
         }
     }
     for band in &mut turned.bands {
@@ -199,11 +190,11 @@ fn a_triangle_turned_over_swaps_its_faces() {
         };
     }
     let settings = coarse();
-    let a = solve(&problem, &settings).solution;
-    let b = solve(&turned, &settings).solution;
+    let a = solve(&scenery.scene(), &settings).solution;
+    let b = solve(&turned.scene(), &settings).solution;
     let largest = a.organs.iter().map(|i| i.absorbed_W).fold(0.0, f64::max);
     for (k, (a, b)) in a.organs.iter().zip(&b.organs).enumerate() {
-        let stem = problem.scene.organs[k / 2].id.ends_with("000");
+        let stem = scenery.organs[k / 2].id.ends_with("000");
         let (up, low) = if stem {
             (b.irradiance_upper_W_m2, b.irradiance_lower_W_m2)
         } else {
@@ -220,17 +211,16 @@ fn a_triangle_turned_over_swaps_its_faces() {
 /// The exchange does not depend on the light, and the light adds up.
 #[test]
 fn light_of_two_sources_adds_up() {
-    let problem = maize();
-    let (sun, sky) = problem.sources.split_last().unwrap();
+    let scenery = maize();
+    let (sun, sky) = scenery.sources.split_last().unwrap();
     let with = |sources: Vec<_>| {
-        let part = Problem {
+        let part = Scenery {
             sources,
-            sky_directions: 0,
-            ..problem.clone()
+            ..scenery.clone()
         };
-        solve(&part, &Settings::default()).solution
+        solve(&part.scene(), &Settings::default()).solution
     };
-    let both = with(problem.sources.clone());
+    let both = with(scenery.sources.clone());
     let (sun, sky) = (with(vec![sun.clone()]), with(sky.to_vec()));
     let z2: Vec<f64> = (0..both.organs.len())
         .map(|k| {
@@ -254,14 +244,14 @@ fn light_of_two_sources_adds_up() {
 
 #[test]
 fn twice_the_light_gives_exactly_twice_the_results() {
-    let problem = maize();
-    let mut twice = problem.clone();
+    let scenery = maize();
+    let mut twice = scenery.clone();
     for source in &mut twice.sources {
         source.irradiance_W_m2.iter_mut().for_each(|e| *e *= 2.0);
     }
     let settings = coarse();
-    let once = solve(&problem, &settings).solution;
-    let twice = solve(&twice, &settings).solution;
+    let once = solve(&scenery.scene(), &settings).solution;
+    let twice = solve(&twice.scene(), &settings).solution;
     for (a, b) in once.organs.iter().zip(&twice.organs) {
         assert_eq!(2.0 * a.absorbed_W, b.absorbed_W);
         assert_eq!(2.0 * a.irradiance_lower_W_m2, b.irradiance_lower_W_m2);
@@ -325,12 +315,13 @@ proptest! {
     /// accounted for.
     #[test]
     fn energy_is_conserved(scenery in any_scenery()) {
-        let mut plan = plan(&scenery.problem, &coarse());
-        (plan.max_edge_m, plan.direct_line_area_m2) = (0.1, 1e-4);
-        if let Some(sampling) = &mut plan.sampling {
+        let scene = scenery.scene();
+        let mut plan = plan(&scene, &coarse());
+        (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.1, 1e-4);
+        if let Some(sampling) = &mut plan.trace.sampling {
             sampling.line_area_m2 = 4e-4;
         }
-        let solution = finish(&scenery.problem, &plan).unwrap().solution;
+        let solution = finish(&scene, &plan).unwrap().solution;
         // a sheet on edge under light along it
         prop_assume!(solution.balance[0].incoming_W > 0.0);
         let found = shares(&solution, 0);
@@ -357,6 +348,6 @@ fn energy_is_conserved_on_open_soil() {
     );
     scenery.band("B", 0.8, &[]);
     scenery.source(from_zenith(0.0, 0.0), 100.0);
-    let found = shares(&solve(&scenery.problem, &coarse()).solution, 0);
+    let found = shares(&solve(&scenery.scene(), &coarse()).solution, 0);
     assert_within(&format!("closure of {found:?}"), found.closure, 0.0, 0.005);
 }

@@ -1,26 +1,25 @@
 //! What must hold of any scene, over ten thousand small ones: of all that has to do with light. A scene is its
-//! seed (`random::scene`). For order, place and limits see `random_scenes_moved.rs`.
+//! seed (`random::scenery`). For order, place and limits see `random_scenes_moved.rs`.
 
 #![allow(clippy::unwrap_used)]
 
 use glam::DVec3;
 use nestrad_common::optics::LeafOptics;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::Plan;
-use nestrad_master::run::Finished;
 use nestrad_tests::extremes::judge::sound;
-use nestrad_tests::random::{Dice, cheap, scene};
-use nestrad_tests::solving::{coarse, finish};
+use nestrad_tests::random::{Dice, cheap, scenery};
+use nestrad_tests::scenery::Scenery;
+use nestrad_tests::solving::{Solved, coarse, finish, plan, try_plan};
 use proptest::prelude::*;
 
 /// Of four properties each, with two or more solves.
 const CASES: u32 = 2500;
 
-fn solved(problem: &Problem) -> Result<Finished, TestCaseError> {
+fn solved(scenery: &Scenery) -> Result<Solved, TestCaseError> {
     let fail = |e: String| TestCaseError::fail(e);
-    let mut plan = Plan::new(problem, &coarse()).map_err(|e| fail(e.to_string()))?;
+    let scene = scenery.scene();
+    let mut plan = try_plan(&scene, &coarse()).map_err(|e| fail(e.to_string()))?;
     cheap(&mut plan);
-    finish(problem, &plan).map_err(|e| fail(e.to_string()))
+    finish(&scene, &plan).map_err(|e| fail(e.to_string()))
 }
 
 /// What rounding and the solver's tolerance (1e-9) may leave.
@@ -33,14 +32,14 @@ proptest! {
     /// sum of the light of each.
     #[test]
     fn light_is_conserved_and_adds_up(seed: u64) {
-        let mut problem = scene(seed).problem;
+        let mut scenery = scenery(seed);
         // three bands alike: both sources, the first, the second
-        let band = problem.bands[0].clone();
-        problem.bands = vec![band; 3];
-        let [a, b] = [0, 1].map(|k: usize| problem.sources[k].irradiance_W_m2[0]);
-        problem.sources[0].irradiance_W_m2 = vec![a, a, 0.0];
-        problem.sources[1].irradiance_W_m2 = vec![b, 0.0, b];
-        let solution = solved(&problem)?.solution;
+        let band = scenery.bands[0].clone();
+        scenery.bands = vec![band; 3];
+        let [a, b] = [0, 1].map(|k: usize| scenery.sources[k].irradiance_W_m2[0]);
+        scenery.sources[0].irradiance_W_m2 = vec![a, a, 0.0];
+        scenery.sources[1].irradiance_W_m2 = vec![b, 0.0, b];
+        let solution = solved(&scenery)?.solution;
         sound(&solution, 0.02).map_err(TestCaseError::fail)?;
         let incoming = solution.balance[0].incoming_W;
         for item in solution.organs.chunks_exact(3) {
@@ -52,13 +51,13 @@ proptest! {
     /// Light times a power of two: all results times it, to the last bit.
     #[test]
     fn light_scales_to_the_bit(seed: u64, power in -20i32..20) {
-        let problem = scene(seed).problem;
+        let scenery = scenery(seed);
         let factor = 2f64.powi(power);
-        let mut brighter = problem.clone();
+        let mut brighter = scenery.clone();
         for source in &mut brighter.sources {
             source.irradiance_W_m2.iter_mut().for_each(|i| *i *= factor);
         }
-        let (a, b) = (solved(&problem)?.solution, solved(&brighter)?.solution);
+        let (a, b) = (solved(&scenery)?.solution, solved(&brighter)?.solution);
         for (a, b) in a.triangles.iter().zip(&b.triangles) {
             prop_assert_eq!(a.irradiance_upper_W_m2 * factor, b.irradiance_upper_W_m2);
             prop_assert_eq!(a.irradiance_lower_W_m2 * factor, b.irradiance_lower_W_m2);
@@ -74,22 +73,23 @@ proptest! {
     /// The unit of length does not matter: lengths times two are powers times four, to the last bit.
     #[test]
     fn lengths_scale_to_the_bit(seed: u64) {
-        let problem = scene(seed).problem;
-        let mut larger = problem.clone();
-        larger.scene.triangles.iter_mut().flatten().for_each(|v| *v *= 2.0);
-        larger.scene.soil_z_m = problem.scene.soil_z_m.map(|z| 2.0 * z);
-        if let Some(pattern) = &mut larger.scene.pattern {
+        let scenery = scenery(seed);
+        let mut larger = scenery.clone();
+        larger.vertices_m().for_each(|v| *v *= 2.0);
+        larger.soil_z_m = scenery.soil_z_m.map(|z| 2.0 * z);
+        if let Some(pattern) = &mut larger.pattern {
             pattern.size_m *= 2.0;
         }
-        let plan = |problem: &Problem, factor: f64| {
-            let mut plan = Plan::new(problem, &coarse()).unwrap();
+        let solved = |scenery: &Scenery, factor: f64| {
+            let scene = scenery.scene();
+            let mut plan = plan(&scene, &coarse());
             cheap(&mut plan);
-            plan.max_edge_m *= factor;
-            plan.soil_cell_m *= factor;
-            plan
+            plan.trace.max_edge_m *= factor;
+            plan.trace.soil_cell_m *= factor;
+            finish(&scene, &plan).unwrap().solution
         };
-        let a = finish(&problem, &plan(&problem, 1.0)).unwrap().solution;
-        let b = finish(&larger, &plan(&larger, 2.0)).unwrap().solution;
+        let a = solved(&scenery, 1.0);
+        let b = solved(&larger, 2.0);
         for (a, b) in a.triangles.iter().zip(&b.triangles) {
             prop_assert_eq!(a.irradiance_upper_W_m2, b.irradiance_upper_W_m2);
             prop_assert_eq!(4.0 * a.absorbed_W, b.absorbed_W);
@@ -99,22 +99,22 @@ proptest! {
     /// Something black more takes light from others and gives none, within the errors.
     #[test]
     fn something_black_brightens_nothing(seed: u64) {
-        let mut scenery = scene(seed);
+        let mut scenery = scenery(seed);
         let mut dice = Dice(!seed);
-        let before = solved(&scenery.problem)?.solution;
+        let before = solved(&scenery)?.solution;
         let mut corner = || DVec3::new(dice.unit(), dice.unit(), dice.unit());
         // within the box of what there is, so that the lines stay where they are
-        let inside = |v: DVec3, problem: &Problem| {
-            let all = || problem.scene.triangles.iter().flatten();
+        let inside = |v: DVec3, scenery: &Scenery| {
+            let all = || scenery.corners_m().flatten();
             let (lo, hi) = all().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(lo, hi), v| (lo.min(*v), hi.max(*v)));
             lo + v * (hi - lo)
         };
-        let corners = [corner(), corner(), corner()].map(|v| inside(v, &scenery.problem));
+        let corners = [corner(), corner(), corner()].map(|v| inside(v, &scenery));
         // the last of the organs, so that random numbers of the others stay as they are
         scenery.triangle("something black", corners);
-        let materials = scenery.problem.scene.materials.len();
-        scenery.problem.bands[0].materials.resize(materials, LeafOptics::default());
-        let after = solved(&scenery.problem)?.solution;
+        let materials = scenery.materials.len();
+        scenery.bands[0].materials.resize(materials, LeafOptics::default());
+        let after = solved(&scenery)?.solution;
         let incoming = before.balance[0].incoming_W;
         for (a, b) in before.organs.iter().zip(&after.organs) {
             let allowed = 1e-4 * incoming;

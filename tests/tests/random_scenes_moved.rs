@@ -1,45 +1,46 @@
 //! What must hold of any scene, over small ones: of order, faces, place and limits. A scene is its seed
-//! (`random::scene`).
+//! (`random::scenery`).
 
 #![allow(clippy::unwrap_used)]
 
 use glam::{DVec2, DVec3};
-use nestrad_common::assemble::{Geometry, build_scene};
-use nestrad_common::formats::Mesh;
+use nestrad_common::assemble::{Geometry, build_canopy};
+use nestrad_common::canopy::{Material, Pattern, Triangle};
+use nestrad_common::formats::GeometryFile;
 use nestrad_common::formats::pattern::Rectangle;
 use nestrad_common::geometry::area;
 use nestrad_common::optics::LeafOptics;
 use nestrad_common::options::{Diameter, Unit};
-use nestrad_common::problem::Problem;
-use nestrad_common::scene::{Material, Pattern};
-use nestrad_master::plan::{Plan, Settings};
-use nestrad_master::solution::Solution;
-use nestrad_tests::random::{Dice, cheap, scene};
-use nestrad_tests::solving::{coarse, finish};
+use nestrad_common::scene::Scene;
+use nestrad_engine::frame::extent_of;
+use nestrad_engine::plan::{Plan, Settings};
+use nestrad_engine::solution::Solution;
+use nestrad_tests::random::{Dice, cheap, scenery};
+use nestrad_tests::scenery::Scenery;
+use nestrad_tests::solving::{coarse, finish, sources, try_plan};
 use proptest::prelude::*;
 
 const CASES: u32 = 1000;
 
-fn planned(problem: &Problem, settings: &Settings) -> Result<Plan, TestCaseError> {
-    let mut plan = Plan::new(problem, settings).map_err(|e| TestCaseError::fail(e.to_string()))?;
+fn planned(scene: &Scene, settings: &Settings) -> Result<Plan, TestCaseError> {
+    let mut plan = try_plan(scene, settings).map_err(|e| TestCaseError::fail(e.to_string()))?;
     cheap(&mut plan);
     Ok(plan)
 }
 
-fn solved(problem: &Problem) -> Result<Solution, TestCaseError> {
-    by_plan(problem, &planned(problem, &coarse())?)
+fn solved(scene: &Scene) -> Result<Solution, TestCaseError> {
+    by_plan(scene, &planned(scene, &coarse())?)
 }
 
-fn by_plan(problem: &Problem, plan: &Plan) -> Result<Solution, TestCaseError> {
-    let finished = finish(problem, plan).map_err(|e| TestCaseError::fail(e.to_string()))?;
-    Ok(finished.solution)
+fn by_plan(scene: &Scene, plan: &Plan) -> Result<Solution, TestCaseError> {
+    let solved = finish(scene, plan).map_err(|e| TestCaseError::fail(e.to_string()))?;
+    Ok(solved.solution)
 }
 
-/// The triangles of a problem dealt anew; `order[k]` is where triangle k comes from. Organs and materials stand
+/// The triangles of a scene dealt anew; `order[k]` is where triangle k comes from. Organs and materials stand
 /// in order of first appearance, as files are read.
-fn dealt(problem: &Problem, order: &[usize]) -> (Problem, Vec<usize>) {
-    let mut other = problem.clone();
-    let (from, to) = (&problem.scene, &mut other.scene);
+fn dealt(from: &Scenery, order: &[usize]) -> (Scenery, Vec<usize>) {
+    let mut to = from.clone();
     let (mut organs, mut materials) = (Vec::new(), Vec::new());
     let number = |list: &mut Vec<usize>, of: u32| {
         let found = list.iter().position(|&k| k == of as usize);
@@ -49,9 +50,12 @@ fn dealt(problem: &Problem, order: &[usize]) -> (Problem, Vec<usize>) {
         }) as u32
     };
     for (k, &t) in order.iter().enumerate() {
-        to.triangles[k] = from.triangles[t];
-        to.organ[k] = number(&mut organs, from.organ[t]);
-        to.material[k] = number(&mut materials, from.material[t]);
+        let triangle = from.triangles[t];
+        to.triangles[k] = Triangle {
+            organ: number(&mut organs, triangle.organ),
+            material: number(&mut materials, triangle.material),
+            ..triangle
+        };
     }
     // materials of no triangle stay at the end
     for m in 0..from.materials.len() as u32 {
@@ -62,42 +66,44 @@ fn dealt(problem: &Problem, order: &[usize]) -> (Problem, Vec<usize>) {
         .iter()
         .map(|&m| from.materials[m].clone())
         .collect();
-    for (band, was) in other.bands.iter_mut().zip(&problem.bands) {
+    for (band, was) in to.bands.iter_mut().zip(&from.bands) {
         band.materials = materials.iter().map(|&m| was.materials[m]).collect();
     }
-    (other, organs)
+    (to, organs)
 }
 
 /// A plan like a user's: with rays, probes and elements of its own.
-fn as_a_user_plans(problem: &Problem, diameter: Diameter) -> Result<Plan, TestCaseError> {
+fn as_a_user_plans(scene: &Scene, diameter: Diameter) -> Result<Plan, TestCaseError> {
     let settings = Settings {
         diameter,
         ..coarse()
     };
-    let mut plan = planned(problem, &settings)?;
-    if let Some(sampling) = &mut plan.sampling {
+    let mut plan = planned(scene, &settings)?;
+    if let Some(sampling) = &mut plan.trace.sampling {
         sampling.least_samples = 8.0;
     }
     Ok(plan)
 }
 
 fn permuted(seed: u64, bounded: bool) -> Result<(), TestCaseError> {
-    let problem = scene(seed).problem;
+    let scenery = scenery(seed);
     let mut dice = Dice(!seed);
-    let mut order: Vec<usize> = (0..problem.scene.triangles.len()).collect();
+    let mut order: Vec<usize> = (0..scenery.triangles.len()).collect();
     for k in (1..order.len()).rev() {
         order.swap(k, dice.below(k + 1));
     }
-    let (other, organs) = dealt(&problem, &order);
+    let (other, organs) = dealt(&scenery, &order);
+    let (scene, other) = (scenery.scene(), other.scene());
     let diameter = if bounded {
         Diameter::Metres(0.4)
     } else {
         Diameter::Auto
     };
-    let plan = as_a_user_plans(&problem, diameter)?;
+    let plan = as_a_user_plans(&scene, diameter)?;
     let again = as_a_user_plans(&other, diameter)?;
-    prop_assert_eq!(plan.direct_line_area_m2, again.direct_line_area_m2);
-    let (a, b) = (by_plan(&problem, &plan)?, by_plan(&other, &again)?);
+    let pitches = [&plan, &again].map(|plan| plan.light.direct_line_area_m2);
+    prop_assert_eq!(pitches[0], pitches[1]);
+    let (a, b) = (by_plan(&scene, &plan)?, by_plan(&other, &again)?);
     for (k, &t) in order.iter().enumerate() {
         prop_assert_eq!(a.triangles[t], b.triangles[k]);
     }
@@ -129,13 +135,14 @@ proptest! {
 const ROUNDING: f64 = 1e-6;
 
 /// No organ is so small that its direct light comes of random rays.
-fn without_probes(problem: &Problem, plan: &Plan) -> bool {
-    let coarsest = plan
-        .direct_line_areas_m2(problem)
-        .into_iter()
-        .fold(0.0, f64::max);
-    let areas = problem.scene.triangles.iter().map(area);
-    areas.into_iter().all(|a| a > 20.0 * coarsest)
+fn without_probes(scene: &Scene, plan: &Plan) -> bool {
+    let sources = sources(scene, &plan.aims, plan.light.seed);
+    let line_areas_m2 = plan
+        .light
+        .line_areas_m2(&extent_of(&scene.canopy), &sources);
+    let coarsest = line_areas_m2.into_iter().fold(0.0, f64::max);
+    let mut areas = scene.canopy.corners_m().map(|corners| area(&corners));
+    areas.all(|a| a > 20.0 * coarsest)
 }
 
 /// All organs alike, relative to the incoming light.
@@ -162,17 +169,19 @@ proptest! {
     /// else changes. To rounding: its pieces are numbered in another order, so sums are.
     #[test]
     fn turning_a_triangle_over_swaps_its_faces(seed: u64) {
-        let problem = scene(seed).problem;
-        let t = Dice(!seed).below(problem.scene.triangles.len());
-        let mut turned = problem.clone();
-        turned.scene.triangles[t].swap(1, 2);
-        turned.scene.materials.push(Material::Named("turned".to_owned()));
-        turned.scene.material[t] = turned.scene.materials.len() as u32 - 1;
-        let LeafOptics { upper, lower } = problem.bands[0].materials[problem.scene.material[t] as usize];
+        let scenery = scenery(seed);
+        let t = Dice(!seed).below(scenery.triangles.len());
+        let material = scenery.triangles[t].material;
+        let mut turned = scenery.clone();
+        turned.triangles[t].corners_m.swap(1, 2);
+        turned.materials.push(Material::Named("turned".to_owned()));
+        turned.triangles[t].material = turned.materials.len() as u32 - 1;
+        let LeafOptics { upper, lower } = scenery.bands[0].materials[material as usize];
         turned.bands[0].materials.push(LeafOptics { upper: lower, lower: upper });
-        let plan = planned(&problem, &coarse())?;
-        prop_assume!(without_probes(&problem, &plan));
-        let (a, b) = (by_plan(&problem, &plan)?, by_plan(&turned, &plan)?);
+        let scene = scenery.scene();
+        let plan = planned(&scene, &coarse())?;
+        prop_assume!(without_probes(&scene, &plan));
+        let (a, b) = (by_plan(&scene, &plan)?, by_plan(&turned.scene(), &plan)?);
         alike(seed, &a, &b, ROUNDING)?;
         let bound = ROUNDING * a.balance[0].incoming_W / a.triangle_area_m2[t];
         let (a, b) = (&a.triangles[t], &b.triangles[t]);
@@ -183,67 +192,66 @@ proptest! {
     /// All of a scene moved, by as much as a map does: the same light, to rounding.
     #[test]
     fn a_scene_may_stand_anywhere(seed: u64) {
-        let mut problem = scene(seed).problem;
+        let mut scenery = scenery(seed);
         // both places are exact in binary: 2^-30 of a metre is a nanometre
         let rounded = |v: DVec3| (v * 2f64.powi(30)).round() / 2f64.powi(30);
-        problem.scene.triangles.iter_mut().flatten().for_each(|v| *v = rounded(*v));
-        problem.scene.soil_z_m = problem.scene.soil_z_m.map(|_| -0.0625);
-        if let Some(pattern) = &mut problem.scene.pattern {
+        scenery.vertices_m().for_each(|v| *v = rounded(*v));
+        scenery.soil_z_m = scenery.soil_z_m.map(|_| -0.0625);
+        if let Some(pattern) = &mut scenery.pattern {
             pattern.size_m = DVec2::new(0.6875, 0.90625);
         }
         let mut dice = Dice(!seed);
         let mut far = || (1e6 * (dice.unit() - 0.5)).round();
         let by = DVec3::new(far(), far(), far());
-        let mut moved = problem.clone();
-        moved.scene.triangles.iter_mut().flatten().for_each(|v| *v += by);
-        moved.scene.soil_z_m = problem.scene.soil_z_m.map(|z| z + by.z);
-        if let Some(pattern) = &mut moved.scene.pattern {
+        let mut moved = scenery.clone();
+        moved.vertices_m().for_each(|v| *v += by);
+        moved.soil_z_m = scenery.soil_z_m.map(|z| z + by.z);
+        if let Some(pattern) = &mut moved.pattern {
             pattern.min_m += by.truncate();
         }
-        let plan = planned(&problem, &coarse())?;
-        alike(seed, &by_plan(&problem, &plan)?, &by_plan(&moved, &plan)?, ROUNDING)?;
+        let scene = scenery.scene();
+        let plan = planned(&scene, &coarse())?;
+        alike(seed, &by_plan(&scene, &plan)?, &by_plan(&moved.scene(), &plan)?, ROUNDING)?;
     }
 
     /// A leaf of a pattern is the same leaf one pattern on.
     #[test]
     fn a_leaf_may_stand_in_any_copy_of_the_pattern(seed: u64) {
-        let problem = scene(seed).problem;
-        let Some(pattern) = problem.scene.pattern else { return Ok(()) };
+        let scenery = scenery(seed);
+        let Some(pattern) = scenery.pattern else { return Ok(()) };
         let mut dice = Dice(!seed);
-        let mut moved = problem.clone();
-        for triangle in &mut moved.scene.triangles {
+        let mut moved = scenery.clone();
+        for triangle in &mut moved.triangles {
             let copies = DVec2::new(dice.below(7) as f64 - 3.0, dice.below(7) as f64 - 3.0);
-            triangle.iter_mut().for_each(|v| *v += (copies * pattern.size_m).extend(0.0));
+            triangle.corners_m.iter_mut().for_each(|v| *v += (copies * pattern.size_m).extend(0.0));
         }
-        let plan = planned(&problem, &coarse())?;
-        alike(seed, &by_plan(&problem, &plan)?, &by_plan(&moved, &plan)?, ROUNDING)?;
+        let scene = scenery.scene();
+        let plan = planned(&scene, &coarse())?;
+        alike(seed, &by_plan(&scene, &plan)?, &by_plan(&moved.scene(), &plan)?, ROUNDING)?;
     }
 
     /// The same scene written in another unit is the same, to rounding.
     #[test]
     fn the_unit_means_nothing(seed: u64) {
-        let problem = scene(seed).problem;
+        let from = scenery(seed);
         let written = |unit: Unit| {
             let per_metre = unit.per_metre();
-            let from = &problem.scene;
-            let mesh = Mesh {
-                file: "scene.can".to_owned(),
-                triangles: from.triangles.iter().map(|t| t.map(|v| v * per_metre)).collect(),
-                line: (1..=from.triangles.len() as u32).collect(),
-                organ: from.organ.clone(),
-                material: from.material.clone(),
-                organs: from.organs.clone(),
-                materials: from.materials.clone(),
-            };
+            let mut file = GeometryFile::new("scene.can");
+            for triangle in &from.triangles {
+                let corners_m = triangle.corners_m.map(|v| v * per_metre);
+                file.push(&Triangle { corners_m, ..*triangle });
+            }
+            file.line = (1..=from.triangles.len() as u32).collect();
+            (file.organs, file.materials) = (from.organs.clone(), from.materials.clone());
             let corners = |p: Pattern| [0.0, 0.0, p.size_m.x * per_metre, p.size_m.y * per_metre];
             let geometry = Geometry {
-                meshes: vec![mesh],
+                files: vec![file],
                 pattern: from.pattern.and_then(|p| Rectangle::from_corners(corners(p))),
                 soil: from.soil_z_m.map(|z| z * per_metre),
                 unit,
             };
-            let (scene, _) = build_scene(geometry).map_err(|e| TestCaseError::fail(e.to_string()))?;
-            Ok::<_, TestCaseError>(Problem { scene, ..problem.clone() })
+            let (canopy, _) = build_canopy(geometry).map_err(|e| TestCaseError::fail(e.to_string()))?;
+            Ok::<_, TestCaseError>(Scene { canopy: canopy.into(), ..from.scene() })
         };
         let metres = written(Unit::Metre)?;
         let plan = planned(&metres, &coarse())?;
@@ -256,10 +264,10 @@ proptest! {
     /// As leaves absorb less and less, their light goes to that of leaves that absorb nothing.
     #[test]
     fn light_goes_to_that_of_conservative_leaves(seed: u64) {
-        let mut problem = scene(seed).problem;
+        let mut scenery = scenery(seed);
         let loss = [1e-3, 1e-6, 1e-9, 0.0];
-        let first = problem.bands[0].clone();
-        problem.bands = loss.map(|loss| {
+        let first = scenery.bands[0].clone();
+        scenery.bands = loss.map(|loss| {
             let mut band = first.clone();
             for face in band.materials.iter_mut().flat_map(|m| [&mut m.upper, &mut m.lower]) {
                 let all = face.rho + face.tau;
@@ -268,10 +276,10 @@ proptest! {
             }
             band
         }).to_vec();
-        for source in &mut problem.sources {
+        for source in &mut scenery.sources {
             source.irradiance_W_m2 = vec![source.irradiance_W_m2[0]; loss.len()];
         }
-        let solution = solved(&problem)?;
+        let solution = solved(&scenery.scene())?;
         let brightest = solution.organs.iter().map(|i| i.irradiance_upper_W_m2.max(i.irradiance_lower_W_m2)).fold(0.0, f64::max);
         for organ in solution.organs.chunks_exact(loss.len()) {
             let limit = organ[loss.len() - 1];
@@ -288,9 +296,9 @@ proptest! {
     /// As the sphere grows, light goes to that without a sphere; beyond all lines of sight it is that, to the bit.
     #[test]
     fn light_goes_to_that_without_a_sphere(seed: u64) {
-        let problem = scene(seed).problem;
-        prop_assume!(problem.scene.pattern.is_some());
-        let of = |diameter| by_plan(&problem, &planned(&problem, &Settings { diameter, ..coarse() })?);
+        let scene = scenery(seed).scene();
+        prop_assume!(scene.canopy.pattern.is_some());
+        let of = |diameter| by_plan(&scene, &planned(&scene, &Settings { diameter, ..coarse() })?);
         let whole = of(Diameter::Infinite)?;
         prop_assert_eq!(&whole, &of(Diameter::Metres(1e9))?);
         // a line in a hundred is longer than this, a tenth of which is not lost in the far field

@@ -2,18 +2,18 @@
 
 #![allow(clippy::print_stderr, reason = "the figures are worth reading")]
 
-use nestrad_master::plan::Settings;
+use nestrad_engine::plan::Settings;
 use nestrad_tests::reference::{misfit, organs, sample, shared, totals};
 use nestrad_tests::solving::solve;
 
 /// Totals within 0.2 % of the incoming light, organs within `most_rms`, in both bands.
 fn check(name: &str, soil_m: f64, most_rms: f64) {
     let Some(folder) = shared() else { return };
-    let problem = sample(&folder, name, soil_m);
-    let solution = solve(&problem, &Settings::default()).solution;
+    let scene = sample(&folder, name, soil_m);
+    let solution = solve(&scene, &Settings::default()).solution;
     let reference = organs(&folder, name);
-    for (b, band) in problem.bands.iter().enumerate() {
-        let found = misfit(&problem, &solution, &reference, b);
+    for (b, band) in scene.optics.bands.iter().enumerate() {
+        let found = misfit(&scene, &solution, &reference, b);
         let balance = &solution.balance[b];
         let totals = totals(&folder, name, &band.name);
         let off: Vec<f64> = [

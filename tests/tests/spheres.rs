@@ -5,31 +5,29 @@
 
 use nestrad_common::generate::LeafAngles;
 use nestrad_common::options::Diameter;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::Settings;
-use nestrad_master::solution::Solution;
-use nestrad_tests::canopies::{par_and_nir, problem, small_leaves, small_maize, uniform_sky};
-use nestrad_tests::scenery::{Scenery, from_zenith};
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::Settings;
+use nestrad_engine::solution::Solution;
+use nestrad_tests::canopies::{par_and_nir, scenery, small_leaves, small_maize, uniform_sky};
+use nestrad_tests::scenery::from_zenith;
 use nestrad_tests::solving::{finish, plan, shares};
 use nestrad_tests::statistics::{mean_and_deviation, median};
 
-fn maize(periodic: bool) -> Problem {
-    let mut scenery = Scenery {
-        problem: problem(&small_maize(), &par_and_nir(), Vec::new()),
-    };
+fn maize(periodic: bool) -> Scene {
+    let mut scenery = scenery(&small_maize(), &par_and_nir(), Vec::new());
     if !periodic {
-        scenery.problem.scene.pattern = None;
+        scenery.pattern = None;
     }
     scenery.source(from_zenith(40.0, 160.0), 400.0);
-    scenery.problem
+    scenery.scene()
 }
 
-fn within(problem: &Problem, diameter: Diameter) -> Solution {
+fn within(scene: &Scene, diameter: Diameter) -> Solution {
     let settings = Settings {
         diameter,
         ..Settings::default()
     };
-    finish(problem, &plan(problem, &settings)).unwrap().solution
+    finish(scene, &plan(scene, &settings)).unwrap().solution
 }
 
 /// Longer than any line of sight: the lowest of a few thousand directions stands about 1e-4 above the
@@ -38,29 +36,29 @@ const LONGER_M: f64 = 1e7;
 
 #[test]
 fn a_sphere_larger_than_a_periodic_scene_changes_no_bit() {
-    let problem = maize(true);
-    let whole = within(&problem, Diameter::Infinite);
-    assert!(whole == within(&problem, Diameter::Metres(LONGER_M)));
+    let scene = maize(true);
+    let whole = within(&scene, Diameter::Infinite);
+    assert!(whole == within(&scene, Diameter::Metres(LONGER_M)));
 }
 
 #[test]
 fn a_sphere_larger_than_an_isolated_scene_changes_no_bit() {
-    let problem = maize(false);
-    let whole = within(&problem, Diameter::Infinite);
-    assert!(whole == within(&problem, Diameter::Metres(LONGER_M)));
+    let scene = maize(false);
+    let whole = within(&scene, Diameter::Infinite);
+    assert!(whole == within(&scene, Diameter::Metres(LONGER_M)));
     // no plants are farther apart than 10 m: what leaves them sideways sees the sky, or the soil
-    assert!(whole == within(&problem, Diameter::Metres(20.0)));
+    assert!(whole == within(&scene, Diameter::Metres(20.0)));
 }
 
 /// Organs against plain radiosity: the error falls as the sphere grows, and energy stays conserved.
 #[test]
 fn a_growing_sphere_comes_ever_closer_to_plain_radiosity() {
-    let problem = maize(true);
-    let whole = within(&problem, Diameter::Infinite);
+    let scene = maize(true);
+    let whole = within(&scene, Diameter::Infinite);
     for band in 0..2 {
         let mut last = f64::INFINITY;
         for diameter in [0.2, 0.8, 3.2] {
-            let part = within(&problem, Diameter::Metres(diameter));
+            let part = within(&scene, Diameter::Metres(diameter));
             let (mut error2, mut all2) = (0.0, 0.0);
             for (a, b) in whole.organs.iter().zip(&part.organs).skip(band).step_by(2) {
                 error2 += (a.absorbed_W - b.absorbed_W).powi(2);
@@ -90,7 +88,7 @@ fn a_growing_sphere_comes_ever_closer_to_plain_radiosity() {
 #[test]
 fn stated_errors_hold_what_the_far_field_samples() {
     let leaves = small_leaves(2.0, LeafAngles::Spherical, 1.5e-2, 5);
-    let problem = problem(&leaves, &par_and_nir(), uniform_sky(12, 2));
+    let scene = scenery(&leaves, &par_and_nir(), uniform_sky(12, 2)).scene();
     for diameter in [0.02, 0.3, 1.0] {
         let solutions: Vec<Solution> = (1..=20)
             .map(|seed| {
@@ -100,9 +98,7 @@ fn stated_errors_hold_what_the_far_field_samples() {
                     seed,
                     ..Settings::default()
                 };
-                finish(&problem, &plan(&problem, &settings))
-                    .unwrap()
-                    .solution
+                finish(&scene, &plan(&scene, &settings)).unwrap().solution
             })
             .collect();
         for band in 0..2 {
@@ -111,7 +107,7 @@ fn stated_errors_hold_what_the_far_field_samples() {
             let stated = rms(closures().map(|c| c.se));
             let (mean, scatter) = mean_and_deviation(&off);
             let (mean, scatter) = (mean / stated, scatter / stated);
-            let organs: Vec<f64> = (0..problem.scene.organs.len())
+            let organs: Vec<f64> = (0..scene.canopy.organs.len())
                 .map(|o| {
                     let items = || solutions.iter().map(|s| &s.organs[2 * o + band]);
                     let absorbed: Vec<f64> = items().map(|i| i.absorbed_W).collect();

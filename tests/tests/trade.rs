@@ -7,22 +7,21 @@
 #![allow(clippy::unwrap_used, reason = "what cannot be set up fails the test")]
 
 use nestrad_common::options::Diameter;
-use nestrad_master::output::progress::Progress;
-use nestrad_master::trade::request::Request;
-use nestrad_master::trade::setting::{Setting, grid};
-use nestrad_master::trade::study::{Done, run};
-use nestrad_master::trade::table::Comparison;
-use nestrad_master::trade::{About, write};
-use nestrad_tests::canopies::{par_and_nir, problem, small_maize, uniform_sky};
+use nestrad_results::trade::request::Request;
+use nestrad_results::trade::setting::{Setting, grid};
+use nestrad_results::trade::study::{SettingRun, carry_out};
+use nestrad_results::trade::table::Comparison;
+use nestrad_results::trade::{About, write};
+use nestrad_tests::canopies::{par_and_nir, scenery, small_maize, uniform_sky};
+use nestrad_tests::solving::unwatched;
 
 #[test]
 fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
-    let problem = problem(&small_maize(), &par_and_nir(), uniform_sky(46, 2));
+    let scene = scenery(&small_maize(), &par_and_nir(), uniform_sky(46, 2)).scene();
     let folder = tempfile::tempdir().unwrap();
     let settings = [5.0, 0.7, 0.35].map(Setting::asked);
     let request = Request {
-        problem: &problem,
-        sky: None,
+        scene: &scene,
         out: folder.path(),
         settings: &settings,
         finest_percent: 0.5,
@@ -30,10 +29,10 @@ fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
         runs: 2,
         seed: 1,
     };
-    let progress = Progress::new(true);
-    let first = run(&request, &progress, |_| {}).unwrap();
+    let study = || unwatched(|run| carry_out(&request, run, |_| {})).unwrap();
+    let first = study();
     assert_eq!(first.computed, 3 + 2 * settings.len());
-    let again = run(&request, &progress, |_| {}).unwrap();
+    let again = study();
     assert_eq!(again.computed, 0);
     assert_eq!(again.measured, first.measured);
     let written = [&first, &again].map(|study| {
@@ -56,7 +55,7 @@ fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
     });
     assert!(written[0] == written[1]);
     let of_band = |band: usize| -> Vec<f64> {
-        let of_setting = |runs: &Result<Vec<Done>, String>| {
+        let of_setting = |runs: &Result<Vec<SettingRun>, String>| {
             let runs = runs.as_ref().unwrap().iter();
             let squares: Vec<f64> = runs.map(|r| r.square_percent2[band]).collect();
             first.bands[band].1.range(&squares).percent
@@ -83,15 +82,15 @@ fn errors_fall_with_accuracy_and_a_second_study_computes_nothing() {
 
 #[test]
 fn a_grid_has_nothing_far_finer_than_its_finest_target() {
-    let problem = problem(&small_maize(), &par_and_nir(), uniform_sky(46, 2));
-    let settings = grid(&problem, 2.0);
+    let scene = scenery(&small_maize(), &par_and_nir(), uniform_sky(46, 2)).scene();
+    let settings = grid(&scene.canopy, 2.0);
     assert!(
         settings.iter().all(|s| s.accuracy_percent >= 1.6),
         "{settings:?}"
     );
     let spheres = settings.iter().filter(|s| s.diameter != Diameter::Infinite);
     assert!(spheres.count() > 3, "{settings:?}");
-    let finer = grid(&problem, 0.2);
+    let finer = grid(&scene.canopy, 0.2);
     let names: Vec<String> = finer.iter().map(ToString::to_string).collect();
     assert!(
         finer.len() > settings.len() && finer.len() < 40,

@@ -1,7 +1,7 @@
 //! A closed mesh lets nothing through, in either estimator, at any offset. `cargo run --release -p
 //! nestrad-tests --bin leaks` counts more; rays exactly through edges and corners are tested in the worker.
 
-use nestrad_master::plan::Estimator;
+use nestrad_engine::plan::Estimator;
 use nestrad_tests::leaks::{OFFSETS_M, of_sphere};
 
 #[test]

@@ -1,8 +1,7 @@
 #![no_main]
 
 use libfuzzer_sys::fuzz_target;
-use nestrad_proto::v1;
-use nestrad_worker::{Block, Demand};
+use nestrad_proto::{near_field, v1};
 use prost::Message;
 
 fuzz_target!(|bytes: &[u8]| {
@@ -10,7 +9,7 @@ fuzz_target!(|bytes: &[u8]| {
         return;
     };
     // as a worker does, which takes no more memory than was announced
-    if Demand::of_message(&message).block_bytes() < 64 << 20 {
-        let _ = Block::new(&message);
+    if near_field::demand(&message).block_bytes() < 64 << 20 {
+        let _ = near_field::block(&message);
     }
 });

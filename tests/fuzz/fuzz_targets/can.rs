@@ -4,19 +4,23 @@ use libfuzzer_sys::fuzz_target;
 use nestrad_common::formats::{MAX_COORDINATE, can};
 
 fuzz_target!(|bytes: &[u8]| {
-    let Ok(mesh) = can::parse("f", bytes) else {
+    let Ok(file) = can::parse("f", bytes) else {
         return;
     };
-    let vertices = mesh.triangles.iter().flatten();
+    let mesh = &file.mesh;
     assert!(
-        vertices
-            .copied()
+        mesh.vertices
+            .iter()
             .all(|vertex| vertex.abs().max_element() <= MAX_COORDINATE)
     );
-    assert!(mesh.organ.iter().all(|&i| (i as usize) < mesh.organs.len()));
+    let corners = mesh.triangles.as_flattened();
+    assert!(corners.iter().all(|&i| (i as usize) < mesh.vertices.len()));
+    assert!(mesh.organ.iter().all(|&i| (i as usize) < file.organs.len()));
     assert!(
         mesh.material
             .iter()
-            .all(|&i| (i as usize) < mesh.materials.len())
+            .all(|&i| (i as usize) < file.materials.len())
     );
+    let triangles = [file.line.len(), mesh.organ.len(), mesh.material.len()];
+    assert_eq!(triangles, [mesh.len(); 3]);
 });

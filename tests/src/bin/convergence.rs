@@ -9,12 +9,11 @@ use std::{fs, io};
 use nestrad_common::generate::LeafAngles;
 use nestrad_common::optics::LeafOptics;
 use nestrad_common::options::Diameter;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Plan, Settings};
-use nestrad_master::run::Finished;
-use nestrad_tests::canopies::{problem, small_leaves, uniform_sky};
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::Settings;
+use nestrad_tests::canopies::{scenery, small_leaves, uniform_sky};
 use nestrad_tests::chart::{Chart, Curve, svg};
-use nestrad_tests::solving::finish;
+use nestrad_tests::solving::{Solved, finish, try_plan};
 
 const SCATTERED: [f64; 6] = [0.5, 0.9, 0.99, 0.999, 0.999_999, 1.0];
 const LEAF_AREA_INDEX: [f64; 7] = [0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
@@ -22,31 +21,31 @@ const SOIL: [f64; 2] = [0.0, 1.0];
 const TOLERANCES: [f64; 8] = [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8];
 
 /// Three hundred leaves, however large: of spherical angles in a layer of 3 m on 1 m².
-fn canopy(lai: f64, scattered: f64, soil: f64) -> Problem {
+fn canopy(lai: f64, scattered: f64, soil: f64) -> Scene {
     let leaves = small_leaves(lai, LeafAngles::Spherical, lai / 300.0, 5);
     let leaf = LeafOptics::symmetric(0.5 * scattered, 0.5 * scattered);
-    problem(&leaves, &[(leaf, soil)], uniform_sky(12, 1))
+    scenery(&leaves, &[(leaf, soil)], uniform_sky(12, 1)).scene()
 }
 
 fn solved(
-    problem: &Problem,
+    scene: &Scene,
     diameter: Diameter,
     tolerance: f64,
-) -> Result<Finished, Box<dyn std::error::Error>> {
+) -> Result<Solved, Box<dyn std::error::Error>> {
     let settings = Settings {
         diameter,
         accuracy_percent: 5.0,
         ..Settings::default()
     };
-    let mut plan = Plan::new(problem, &settings)?;
+    let mut plan = try_plan(scene, &settings)?;
     // leaves are not cut: it is the solver that is looked at
-    plan.max_edge_m = 1.0;
-    plan.tolerance.absorbed = tolerance;
-    Ok(finish(problem, &plan)?)
+    plan.trace.max_edge_m = 1.0;
+    plan.light.tolerance.absorbed = tolerance;
+    Ok(finish(scene, &plan)?)
 }
 
 /// How far the organs' absorbed powers are from others, all together, relative to what comes in.
-fn apart(a: &Finished, b: &Finished) -> f64 {
+fn apart(a: &Solved, b: &Solved) -> f64 {
     let pairs = a.solution.organs.iter().zip(&b.solution.organs);
     let sum: f64 = pairs
         .map(|(a, b)| (a.absorbed_W - b.absorbed_W).abs())
@@ -65,7 +64,7 @@ fn passes(diameter: Diameter, csv: &mut String) -> Result<Vec<Chart>, Box<dyn st
             let mut points = Vec::new();
             for lai in LEAF_AREA_INDEX {
                 let found = solved(&canopy(lai, scattered, soil), diameter, 1e-6)?;
-                let (n, balance) = (found.counters.passes, &found.solution.balance[0]);
+                let (n, balance) = (found.work.passes, &found.solution.balance[0]);
                 let [closure, se] =
                     [balance.closure_W.value, balance.closure_W.se].map(|w| w / balance.incoming_W);
                 let albedo = balance.escaped_up_W.value / balance.incoming_W;
@@ -96,13 +95,13 @@ fn errors(csv: &mut String) -> Result<Vec<Chart>, Box<dyn std::error::Error>> {
     for lai in [2.0, 20.0] {
         let mut curves = Vec::new();
         for scattered in [0.9, 0.999_999, 1.0] {
-            let problem = canopy(lai, scattered, 0.5);
-            let exact = solved(&problem, Diameter::Infinite, 1e-12)?;
+            let scene = canopy(lai, scattered, 0.5);
+            let exact = solved(&scene, Diameter::Infinite, 1e-12)?;
             let mut points = Vec::new();
             for tolerance in TOLERANCES {
-                let found = solved(&problem, Diameter::Infinite, tolerance)?;
+                let found = solved(&scene, Diameter::Infinite, tolerance)?;
                 let off = apart(&found, &exact);
-                let n = found.counters.passes;
+                let n = found.work.passes;
                 let line = format!("{lai},{scattered},{tolerance:e},{n},{off:.3e}");
                 eprintln!("{line}");
                 let _ = writeln!(csv, "{line}");

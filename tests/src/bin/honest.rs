@@ -9,19 +9,17 @@
 use std::fmt::Write;
 use std::fs;
 
-use nestrad_common::generate::{LeafAngles, Maize, Stand};
-use nestrad_common::light::{Sky, SkyLight};
-use nestrad_common::problem::Problem;
-use nestrad_master::errors::organ_errors;
-use nestrad_master::output::progress::Progress;
-use nestrad_master::output::resources::Stopwatch;
-use nestrad_master::plan::{Aims, Estimator, Plan, Settings};
-use nestrad_master::rounds::solve_in_rounds;
-use nestrad_master::run::Means;
-use nestrad_master::solution::Solution;
-use nestrad_tests::canopies::{par_and_nir, problem, small_leaves, small_maize};
+use nestrad_common::generate::{Generated, LeafAngles, Maize, Stand};
+use nestrad_common::light::Sky;
+use nestrad_common::scene::Scene;
+use nestrad_engine::account::organ_spread;
+use nestrad_engine::plan::{Aims, Estimator, Settings};
+use nestrad_engine::solution::{BandAccount, Solution};
+use nestrad_engine::stopwatch::Stopwatch;
+use nestrad_tests::canopies::{par_and_nir, scenery, sky, small_leaves, small_maize};
 use nestrad_tests::reference::{misfit, organs, sample, shared};
-use nestrad_tests::solving::{apart_percent, finish};
+use nestrad_tests::scenery::Scenery;
+use nestrad_tests::solving::{aimed, apart_percent, finish, in_rounds};
 
 type Fault = Box<dyn std::error::Error>;
 
@@ -33,22 +31,17 @@ type Judge = Box<dyn Fn(&Solution) -> Vec<f64>>;
 
 struct Case {
     name: &'static str,
-    problem: Problem,
-    sky: Option<SkyLight>,
+    scene: Scene,
     judge: Judge,
 }
 
-/// Light of an overcast sky.
-fn overcast() -> SkyLight {
-    SkyLight {
-        sky: Sky::StandardOvercast,
-        irradiance_W_m2: vec![100.0; 2],
+/// A canopy under an overcast sky, judged by rays.
+fn by_rays(name: &'static str, generated: &Generated) -> Result<Case, Fault> {
+    let scene = Scenery {
+        sky: Some(sky(&Sky::StandardOvercast, 2)),
+        ..scenery(generated, &par_and_nir(), Vec::new())
     }
-}
-
-/// A scene under an overcast sky, judged by rays.
-fn by_rays(name: &'static str, unlit: &Problem) -> Result<Case, Fault> {
-    let (sky, mut problem) = (overcast(), unlit.clone());
+    .scene();
     let aims = Aims {
         exchange_percent: 1.2,
         direct_percent: 0.15,
@@ -60,15 +53,14 @@ fn by_rays(name: &'static str, unlit: &Problem) -> Result<Case, Fault> {
         seed: 77,
         ..Settings::default()
     };
-    problem.light_by(&sky, aims.sky_directions(), settings.seed)?;
-    let reference = finish(&problem, &Plan::aimed(&problem, &settings, &aims)?)?;
-    for parts in &reference.errors {
+    let reference = finish(&scene, &aimed(&scene, &settings, &aims))?.solution;
+    for parts in &reference.account {
         eprintln!("{name}: reference {parts:?}");
     }
-    let of_reference = organ_errors(&problem.scene, &reference.solution);
+    let of_reference = organ_spread(&scene.canopy.plants(), &reference);
     let judge = move |solution: &Solution| {
         let apart = |band: usize| {
-            let apart = apart_percent(solution, &reference.solution, band);
+            let apart = apart_percent(solution, &reference, band);
             let own = of_reference[band].rms_percent.unwrap_or(0.0);
             (apart * apart - own * own).max(0.0).sqrt()
         };
@@ -76,8 +68,7 @@ fn by_rays(name: &'static str, unlit: &Problem) -> Result<Case, Fault> {
     };
     Ok(Case {
         name,
-        problem: unlit.clone(),
-        sky: Some(sky),
+        scene,
         judge: Box::new(judge),
     })
 }
@@ -85,16 +76,15 @@ fn by_rays(name: &'static str, unlit: &Problem) -> Result<Case, Fault> {
 /// A sample scene, judged by its Monte Carlo solution.
 fn by_particles(name: &'static str, soil_m: f64) -> Option<Case> {
     let folder = shared()?;
-    let problem = sample(&folder, name, soil_m);
-    let (reference, copy) = (organs(&folder, name), problem.clone());
+    let scene = sample(&folder, name, soil_m);
+    let (reference, copy) = (organs(&folder, name), scene.clone());
     let judge = move |solution: &Solution| {
         let percent = |band| 100.0 * misfit(&copy, solution, &reference, band).rms;
         (0..2).map(percent).collect()
     };
     Some(Case {
         name,
-        problem,
-        sky: None,
+        scene,
         judge: Box::new(judge),
     })
 }
@@ -106,40 +96,27 @@ fn run(case: &Case, percent: f64, seed: u64) -> Result<String, Fault> {
         seed,
         ..Settings::default()
     };
-    let mut problem = case.problem.clone();
-    if let Some(sky) = &case.sky {
-        problem.light_by(sky, Aims::of(percent).sky_directions(), seed)?;
-    }
-    let mut watch = Stopwatch::start();
-    let reached = solve_in_rounds(
-        &problem,
-        case.sky.as_ref(),
-        &settings,
-        Means::default(),
-        &Progress::new(true),
-        &mut watch,
-        |_, _| (),
-    )?;
+    let watch = Stopwatch::start();
+    let solved = in_rounds(&case.scene, &settings)?;
     let cpu_s = watch.usage().cpu_s;
-    let errors = (case.judge)(&reached.finished.solution);
-    let stated = reached.accuracy.errors.iter();
-    let stated: Vec<f64> = stated.map(|parts| parts.total_percent()).collect();
+    let errors = (case.judge)(&solved.solution);
+    let stated = solved.accuracy.errors.iter();
+    let stated: Vec<f64> = stated.map(BandAccount::total_percent).collect();
     let worst = |values: &[f64]| values.iter().copied().fold(0.0, f64::max);
     Ok(format!(
         "{},{percent},{seed},{},{:.2},{:.3},{:.3},{:.3},{:.3},{:?}",
         case.name,
-        reached.accuracy.rounds.len(),
+        solved.accuracy.rounds.len(),
         cpu_s,
         worst(&errors),
         worst(&stated),
         errors[0],
         errors[1],
-        reached.accuracy.ended,
+        solved.accuracy.ended,
     ))
 }
 
 fn main() -> Result<(), Fault> {
-    let lit_later = |scene| problem(scene, &par_and_nir(), Vec::new());
     let wide = Maize {
         stand: Stand {
             rows: 1,
@@ -151,9 +128,9 @@ fn main() -> Result<(), Fault> {
     };
     let homogeneous = small_leaves(3.0, LeafAngles::Spherical, 0.01, 5);
     let mut cases = vec![
-        by_rays("maize", &lit_later(&small_maize()))?,
-        by_rays("sparse maize", &lit_later(&wide.generate()?))?,
-        by_rays("homogeneous", &lit_later(&homogeneous))?,
+        by_rays("maize", &small_maize())?,
+        by_rays("sparse maize", &wide.generate()?)?,
+        by_rays("homogeneous", &homogeneous)?,
     ];
     cases.extend(by_particles("maize_rows", -0.002));
     cases.extend(by_particles("bean_rows", -0.010));

@@ -4,7 +4,7 @@
 
 use std::process::ExitCode;
 
-use nestrad_master::plan::Estimator;
+use nestrad_engine::plan::Estimator;
 use nestrad_tests::leaks::{Leaks, OFFSETS_M, of_sphere};
 
 fn main() -> ExitCode {

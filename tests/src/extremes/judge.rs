@@ -5,13 +5,12 @@ use std::path::Path;
 
 use nestrad_common::assemble::load;
 use nestrad_common::inputs::Inputs;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Plan, Settings};
-use nestrad_master::run::Finished;
-use nestrad_master::solution::Solution;
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::{Plan, Settings};
+use nestrad_engine::solution::Solution;
 
 use super::{Seen, Verdict};
-use crate::solving::finish;
+use crate::solving::{Solved, finish, try_plan};
 
 /// Small scenes need no more.
 pub(super) fn coarse() -> Settings {
@@ -22,21 +21,21 @@ pub(super) fn coarse() -> Settings {
 }
 
 /// Plans and solves as a user's call would; what is solved must be sound.
-pub(super) fn solved(problem: &Problem, settings: &Settings) -> Result<Finished, String> {
-    changed(problem, settings, |_| {})
+pub(super) fn solved(scene: &Scene, settings: &Settings) -> Result<Solved, String> {
+    changed(scene, settings, |_| {})
 }
 
 /// The same with a plan that was changed.
 pub(super) fn changed(
-    problem: &Problem,
+    scene: &Scene,
     settings: &Settings,
     change: impl FnOnce(&mut Plan),
-) -> Result<Finished, String> {
-    let mut plan = Plan::new(problem, settings).map_err(refusal)?;
+) -> Result<Solved, String> {
+    let mut plan = try_plan(scene, settings).map_err(refusal)?;
     change(&mut plan);
-    let finished = finish(problem, &plan).map_err(refusal)?;
-    sound(&finished.solution, plan.tolerance.absorbed)?;
-    Ok(finished)
+    let solved = finish(scene, &plan).map_err(refusal)?;
+    sound(&solved.solution, plan.light.tolerance.absorbed)?;
+    Ok(solved)
 }
 
 /// An error with all its causes.
@@ -50,11 +49,11 @@ pub fn refusal(error: impl std::error::Error) -> String {
     text
 }
 
-/// Reads files; only the message of a refusal is of interest, or the problem.
-pub(super) fn loaded(inputs: &Inputs, folder: &Path) -> Result<Problem, String> {
+/// Reads files; only the message of a refusal is of interest, or the scene.
+pub(super) fn loaded(inputs: &Inputs, folder: &Path) -> Result<Scene, String> {
     let here = format!("{}/", folder.display());
     load(inputs)
-        .map(|loaded| loaded.problem)
+        .map(|loaded| loaded.scene)
         .map_err(|error| refusal(error).replace(&here, ""))
 }
 

@@ -26,7 +26,7 @@ fn standing(zenith_deg: f64, azimuth_deg: f64, expected_W: f64) -> Verdict {
     );
     scenery.band("B", 0.0, &[("leaf", LeafOptics::default())]);
     scenery.source(from_zenith(zenith_deg, azimuth_deg), 100.0);
-    let item = solved(&scenery.problem, &coarse())?.solution.organs[0];
+    let item = solved(&scenery.scene(), &coarse())?.solution.organs[0];
     within_se("power/W", item.absorbed_W, expected_W, item.absorbed_se_W)
 }
 
@@ -34,10 +34,10 @@ fn standing(zenith_deg: f64, azimuth_deg: f64, expected_W: f64) -> Verdict {
 fn under(direction: DVec3, irradiance_W_m2: f64) -> Verdict {
     let leaf = LeafOptics::symmetric(0.4, 0.4);
     let mut scenery = plates(3, 0.1, leaf, 0.2);
-    scenery.problem.sources.clear();
+    scenery.sources.clear();
     scenery.source(direction, irradiance_W_m2);
-    let solution = changed(&scenery.problem, &coarse(), |plan| {
-        (plan.max_edge_m, plan.tolerance.absorbed) = (0.1, 1e-7);
+    let solution = changed(&scenery.scene(), &coarse(), |plan| {
+        (plan.trace.max_edge_m, plan.light.tolerance.absorbed) = (0.1, 1e-7);
     })?
     .solution;
     let incoming = irradiance_W_m2 * 0.24;
@@ -99,7 +99,7 @@ pub(super) fn cases() -> Vec<Case> {
                 scenery.triangle("leaf 1", [DVec3::ZERO, DVec3::Z * 0.3, DVec3::Y * 0.2]);
                 scenery.band("B", 0.0, &[("leaf", LeafOptics::default())]);
                 scenery.source(from_zenith(89.9, 0.0), 100.0);
-                let item = solved(&scenery.problem, &coarse())?.solution.organs[0];
+                let item = solved(&scenery.scene(), &coarse())?.solution.organs[0];
                 let expected = 100.0 * 89.9f64.to_radians().tan() * 0.03;
                 within_se("power/W", item.absorbed_W, expected, item.absorbed_se_W)
             },
@@ -134,16 +134,16 @@ pub(super) fn cases() -> Vec<Case> {
         ),
         Case::new(AXIS, "no light at all", "all results 0", || {
             let mut scenery = plates(2, 0.1, LeafOptics::symmetric(0.4, 0.4), 0.2);
-            scenery.problem.sources.clear();
-            let solution = solved(&scenery.problem, &coarse())?.solution;
+            scenery.sources.clear();
+            let solution = solved(&scenery.scene(), &coarse())?.solution;
             near("power/W", solution.organs[0].absorbed_W, 0.0, 0.0)
         }),
         Case::new(AXIS, "10,000 sources", "adding of 3 plates", || {
             let leaf = LeafOptics::symmetric(0.4, 0.4);
-            let mut problem = plates(3, 0.1, leaf, 0.2).problem;
-            problem.sources = uniform_sky(10_000, 1);
-            let solution = changed(&problem, &coarse(), |plan| {
-                (plan.max_edge_m, plan.direct_line_area_m2) = (0.1, 1e-3);
+            let mut scenery = plates(3, 0.1, leaf, 0.2);
+            scenery.sources = uniform_sky(10_000, 1);
+            let solution = changed(&scenery.scene(), &coarse(), |plan| {
+                (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.1, 1e-3);
             })?
             .solution;
             near(
@@ -161,7 +161,7 @@ pub(super) fn cases() -> Vec<Case> {
                 let leaf = LeafOptics::symmetric(0.4, 0.4);
                 let mut scenery = plates(3, 0.1, leaf, 0.2);
                 scenery.source(from_zenith(20.0, 0.0), 1e14);
-                let solution = changed(&scenery.problem, &coarse(), |p| p.max_edge_m = 0.1)?;
+                let solution = changed(&scenery.scene(), &coarse(), |p| p.trace.max_edge_m = 0.1)?;
                 let albedo = stack(3, leaf, 0.2).albedo;
                 near("albedo", shares(&solution.solution, 0).up, albedo, 1e-3)
             },

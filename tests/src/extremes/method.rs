@@ -6,10 +6,10 @@ use nestrad_common::generate::LeafAngles;
 use nestrad_common::light::Source;
 use nestrad_common::optics::{Band, LeafOptics};
 use nestrad_common::options::Diameter;
-use nestrad_common::problem::Problem;
-use nestrad_master::far_field::layers::{Foliage, Layers};
-use nestrad_master::far_field::transport;
-use nestrad_master::plan::{Plan, Settings};
+use nestrad_common::scene::Scene;
+use nestrad_engine::far_field::layers::{Foliage, Layers};
+use nestrad_engine::far_field::transport;
+use nestrad_engine::plan::{Plan, Settings};
 
 use super::judge::{changed, coarse, near, refusal, refused, solved, within_se};
 use super::{Case, Verdict};
@@ -20,9 +20,9 @@ use crate::solving::shares;
 const AXIS: &str = "Method";
 
 /// Leaves of 12 cm in a layer of 3 m: 130 of them.
-fn canopy() -> Problem {
+fn canopy() -> Scene {
     let leaves = small_leaves(2.0, LeafAngles::Spherical, 1.5e-2, 5);
-    canopies::problem(&leaves, &par_and_nir()[1..], uniform_sky(12, 1))
+    canopies::scenery(&leaves, &par_and_nir()[1..], uniform_sky(12, 1)).scene()
 }
 
 fn diameter(text: &str) -> Result<Settings, String> {
@@ -34,9 +34,9 @@ fn diameter(text: &str) -> Result<Settings, String> {
 
 /// What a diameter does to the light of the canopy, against none.
 fn against_plain(text: &str, bound: f64) -> Verdict {
-    let problem = canopy();
-    let plain = shares(&solved(&problem, &diameter("inf")?)?.solution, 0);
-    let found = shares(&solved(&problem, &diameter(text)?)?.solution, 0);
+    let scene = canopy();
+    let plain = shares(&solved(&scene, &diameter("inf")?)?.solution, 0);
+    let found = shares(&solved(&scene, &diameter(text)?)?.solution, 0);
     near("plants", found.plants, plain.plants, bound)
 }
 
@@ -128,9 +128,10 @@ fn sampling() -> Vec<Case> {
         ),
         Case::new(AXIS, "a sky of one direction", "adding of 3 plates", || {
             let leaf = LeafOptics::symmetric(0.4, 0.4);
-            let mut problem = plates(3, 0.1, leaf, 0.2).problem;
-            problem.sources = uniform_sky(1, 1);
-            let solution = changed(&problem, &coarse(), |p| p.max_edge_m = 0.1)?.solution;
+            let mut scenery = plates(3, 0.1, leaf, 0.2);
+            scenery.sources = uniform_sky(1, 1);
+            let scene = scenery.scene();
+            let solution = changed(&scene, &coarse(), |p| p.trace.max_edge_m = 0.1)?.solution;
             near(
                 "albedo",
                 shares(&solution, 0).up,
@@ -145,10 +146,10 @@ fn sampling() -> Vec<Case> {
     ] {
         cases.push(Case::new(AXIS, name, "adding of 3 plates", move || {
             let leaf = LeafOptics::symmetric(0.4, 0.4);
-            let problem = plates(3, 0.1, leaf, 0.2).problem;
-            let solution = changed(&problem, &coarse(), |plan: &mut Plan| {
-                (plan.max_edge_m, plan.direct_line_area_m2) = (0.1, 5e-6);
-                if let Some(sampling) = &mut plan.sampling {
+            let scene = plates(3, 0.1, leaf, 0.2).scene();
+            let solution = changed(&scene, &coarse(), |plan: &mut Plan| {
+                (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.1, 5e-6);
+                if let Some(sampling) = &mut plan.trace.sampling {
                     sampling.line_area_m2 = pitch * pitch;
                 }
             })?

@@ -2,7 +2,7 @@
 //! one plate and nothing else.
 
 use nestrad_common::optics::{FaceOptics, LeafOptics};
-use nestrad_master::plan::Plan;
+use nestrad_engine::plan::Plan;
 
 use super::judge::{all, changed, coarse, near, refused};
 use super::{Case, Verdict};
@@ -13,8 +13,8 @@ const AXIS: &str = "Optics";
 
 /// Elements that are large against the lines are evenly lit: then nothing is left to chance.
 fn evenly(plan: &mut Plan) {
-    (plan.max_edge_m, plan.direct_line_area_m2) = (0.1, 5e-6);
-    plan.tolerance.absorbed = 1e-8;
+    (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.1, 5e-6);
+    plan.light.tolerance.absorbed = 1e-8;
 }
 
 /// How far from the recursion a plate may be.
@@ -23,7 +23,7 @@ const BOUND: f64 = 1e-6;
 fn follows_recursion(n: usize, leaf: LeafOptics, soil_albedo: f64) -> Verdict {
     let scenery = plates(n, 0.1, leaf, soil_albedo);
     let expected = stack(n, leaf, soil_albedo);
-    let solution = changed(&scenery.problem, &coarse(), evenly)?.solution;
+    let solution = changed(&scenery.scene(), &coarse(), evenly)?.solution;
     let found = shares(&solution, 0);
     let soil = (1.0 - soil_albedo) * expected.soil;
     let plates = 1.0 - expected.albedo - soil;
@@ -108,7 +108,7 @@ pub(super) fn cases() -> Vec<Case> {
         "conservation: albedo 1 within 1e-6 and the closure's error",
         move || {
             let scenery = plates(4, 0.1, same(0.3, 0.7), 1.0);
-            let solution = changed(&scenery.problem, &coarse(), evenly)?.solution;
+            let solution = changed(&scenery.scene(), &coarse(), evenly)?.solution;
             near("albedo", shares(&solution, 0).up, 1.0, BOUND)
         },
     ));
@@ -119,7 +119,7 @@ pub(super) fn cases() -> Vec<Case> {
         move || {
             let valve = faces(face(0.0, 1.0), face(1.0, 0.0));
             let scenery = plates(1, 0.1, valve, 1.0);
-            let outcome = changed(&scenery.problem, &coarse(), evenly);
+            let outcome = changed(&scenery.scene(), &coarse(), evenly);
             refused(outcome, &["did not converge", "band B"])
         },
     ));
@@ -161,15 +161,15 @@ fn most_passes(plates: usize) -> u32 {
 
 fn deep(n: usize, leaf: LeafOptics, soil_albedo: f64) -> Verdict {
     let scenery = plates(n, 0.1, leaf, soil_albedo);
-    let finished = changed(&scenery.problem, &coarse(), |plan| {
+    let solved = changed(&scenery.scene(), &coarse(), |plan| {
         evenly(plan);
-        plan.tolerance.absorbed = 1e-6;
+        plan.light.tolerance.absorbed = 1e-6;
     })?;
-    let passes = finished.counters.passes;
+    let passes = solved.work.passes;
     if passes > most_passes(n) {
         return Err(format!("{passes} passes"));
     }
-    let albedo = shares(&finished.solution, 0).up;
+    let albedo = shares(&solved.solution, 0).up;
     let what = format!("{passes} passes, albedo");
     near(&what, albedo, stack(n, leaf, soil_albedo).albedo, BOUND)
 }
@@ -177,14 +177,14 @@ fn deep(n: usize, leaf: LeafOptics, soil_albedo: f64) -> Verdict {
 fn sixty_four_bands() -> Verdict {
     let leaf = |b: u32| LeafOptics::symmetric(f64::from(b) / 126.0, f64::from(b) / 130.0);
     let mut scenery = plates(3, 0.1, leaf(0), 0.2);
-    scenery.problem.bands.clear();
+    scenery.bands.clear();
     for b in 0..64 {
         scenery.band(&format!("B{b}"), 0.2, &[("leaf", leaf(b))]);
     }
-    for source in &mut scenery.problem.sources {
+    for source in &mut scenery.sources {
         source.irradiance_W_m2 = vec![source.irradiance_W_m2[0]; 64];
     }
-    let solution = changed(&scenery.problem, &coarse(), evenly)?.solution;
+    let solution = changed(&scenery.scene(), &coarse(), evenly)?.solution;
     all((0..64).rev().map(|b| {
         let expected = stack(3, leaf(b), 0.2).albedo;
         near(

@@ -1,11 +1,13 @@
 //! Where the scene is, and in which unit it is written: through files, as a user brings it.
 
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use glam::{DQuat, DVec3};
+use nestrad_common::light::Light;
 use nestrad_common::options::Unit;
-use nestrad_common::problem::Problem;
-use nestrad_master::solution::ItemLight;
+use nestrad_common::scene::Scene;
+use nestrad_engine::solution::ItemLight;
 
 use super::judge::{coarse, loaded, refused, solved, solving, within_se};
 use super::{Case, Seen, Verdict};
@@ -41,7 +43,7 @@ fn written(
     unit: Unit,
     moved_m: DVec3,
     periodic: bool,
-) -> Result<Problem, String> {
+) -> Result<Scene, String> {
     let folder = tempfile::tempdir().map_err(|e| e.to_string())?;
     let written = Written {
         leaves,
@@ -53,6 +55,13 @@ fn written(
         moved_m,
     };
     loaded(&written.inputs(folder.path()), folder.path())
+}
+
+/// The repeating scene, with its soil at another height.
+fn over_soil_at(z_m: f64) -> Result<Scene, String> {
+    let mut scene = written(&leaves(), Unit::Metre, DVec3::ZERO, true)?;
+    Arc::make_mut(&mut scene.canopy).soil_z_m = Some(z_m);
+    Ok(scene)
 }
 
 /// The largest difference in any output of any organ, relative to its value.
@@ -144,9 +153,8 @@ pub(super) fn cases() -> Vec<Case> {
         "the soil 1e11 m below the leaves",
         "refused: heights are not resolved",
         || {
-            let mut problem = written(&leaves(), Unit::Metre, DVec3::ZERO, true)?;
-            problem.scene.soil_z_m = Some(-1e11);
-            refused(solved(&problem, &coarse()), &["height of the soil"])
+            let scene = over_soil_at(-1e11)?;
+            refused(solved(&scene, &coarse()), &["height of the soil"])
         },
     ));
     cases.push(Case::new(
@@ -154,9 +162,7 @@ pub(super) fn cases() -> Vec<Case> {
         "the soil above all leaves",
         "leaves get no light, the soil all of it",
         || {
-            let mut problem = written(&leaves(), Unit::Metre, DVec3::ZERO, true)?;
-            problem.scene.soil_z_m = Some(5.0);
-            let solution = solved(&problem, &coarse())?.solution;
+            let solution = solved(&over_soil_at(5.0)?, &coarse())?.solution;
             let leaves: f64 = solution.organs.iter().map(|o| o.absorbed_W).sum();
             let balance = &solution.balance[0];
             let soil = balance.absorbed_soil_W.value / balance.incoming_W;
@@ -174,13 +180,14 @@ fn turned(turn_deg: f64) -> Verdict {
     let absorbed = |turn_deg: f64| {
         let turn = DQuat::from_rotation_z(turn_deg.to_radians());
         let leaves: Vec<_> = leaves().into_iter().map(|t| t.map(|v| turn * v)).collect();
-        let mut problem = written(&leaves, Unit::Metre, DVec3::ZERO, false)?;
+        let mut scene = written(&leaves, Unit::Metre, DVec3::ZERO, false)?;
         // a sky of finitely many directions turns with the scene
-        problem.sources = uniform_sky(64, 2);
-        for source in &mut problem.sources {
+        let mut suns = uniform_sky(64, 2);
+        for source in &mut suns {
             source.direction = turn * source.direction;
         }
-        Ok::<_, String>(solved(&problem, &coarse())?.solution.balance)
+        scene.light = Arc::new(Light { suns, sky: None });
+        Ok::<_, String>(solved(&scene, &coarse())?.solution.balance)
     };
     let (before, after) = (absorbed(0.0)?, absorbed(turn_deg)?);
     let mut figures: Vec<Seen> = Vec::new();

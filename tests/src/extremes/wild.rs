@@ -1,12 +1,12 @@
 //! Wild scenes: solved soundly or refused, whatever they are.
 
-use nestrad_master::plan::{Plan, Settings};
-use nestrad_master::run::RunError;
+use nestrad_engine::plan::Settings;
+use nestrad_engine::traced::SolveError;
 
 use super::judge::{refusal, solving, sound};
 use super::{Case, Seen};
 use crate::random::wild;
-use crate::solving::finish;
+use crate::solving::{finish, try_plan};
 
 /// What happens where the program itself finds that light is missing: a refusal, but one that a seed must not
 /// hide behind.
@@ -30,8 +30,8 @@ pub fn case_within(seed: u64, memory_GiB: f64) -> Case {
                     figure,
                 })
             };
-            let problem = match wild(seed) {
-                Ok(problem) => problem,
+            let scene = match wild(seed) {
+                Ok(scene) => scene,
                 Err(fault) => return message(fault),
             };
             let settings = Settings {
@@ -39,19 +39,17 @@ pub fn case_within(seed: u64, memory_GiB: f64) -> Case {
                 memory_GiB,
                 ..Settings::default()
             };
-            let plan = match Plan::new(&problem, &settings) {
+            let plan = match try_plan(&scene, &settings) {
                 Ok(plan) => plan,
                 Err(fault) => return message(refusal(fault)),
             };
-            match finish(&problem, &plan) {
-                Ok(finished) => {
-                    sound(&finished.solution, 0.05)?;
-                    Ok(solving(format!(
-                        "{} organs",
-                        finished.solution.organs.len()
-                    )))
+            match finish(&scene, &plan) {
+                Ok(solved) => {
+                    sound(&solved.solution, 0.05)?;
+                    let organs = solved.solution.organs.len();
+                    Ok(solving(format!("{organs} organs")))
                 }
-                Err(fault @ RunError::Unbalanced { .. }) => Ok(Seen {
+                Err(fault @ SolveError::Unbalanced { .. }) => Ok(Seen {
                     happens: UNBALANCED,
                     figure: fault.to_string(),
                 }),

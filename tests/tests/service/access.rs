@@ -21,7 +21,7 @@ const WORKER: &str = "token-of-the-workers-1";
 fn codes(url: &str, credentials: &Credentials) -> (Option<Code>, Option<Code>) {
     block_on(async {
         let channel = connect(url, credentials).unwrap();
-        let mut client = nestrad_master::remote::client(channel.clone());
+        let mut client = nestrad_service::client::client(channel.clone());
         let status = client.status(v1::StatusRequest {}).await;
         let health = HealthClient::new(channel)
             .check(HealthCheckRequest::default())

@@ -81,9 +81,9 @@ fn memory_of_a_solve_and_the_queue_are_bounded() {
     block_on(async {
         let mut client = client(&master);
         desk.maize("maize", "1");
-        let problem = desk.problem("maize/scene.toml");
+        let scene = desk.scene("maize/scene.toml");
         // a solve that takes long, one that waits, and no more
-        let settings = nestrad_master::plan::Settings {
+        let settings = nestrad_engine::plan::Settings {
             accuracy_percent: 0.1,
             memory_GiB: 2.0,
             ..Default::default()
@@ -91,7 +91,7 @@ fn memory_of_a_solve_and_the_queue_are_bounded() {
         let other = client.clone();
         let long = tokio::spawn(async move {
             let stop = std::future::pending();
-            nestrad_master::remote::solve(other, problem, &settings, |_| {}, stop).await
+            nestrad_service::client::solve(other, scene, &settings, |_| {}, stop).await
         });
         let scene = upload(&mut client, one_leaf()).await.unwrap().scene_id;
         let list = v1::ListSolvesRequest {};

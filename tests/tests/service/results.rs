@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use nestrad_master::plan::Settings;
+use nestrad_engine::plan::Settings;
 use nestrad_proto::v1;
 use nestrad_tests::calls::{block_on, client, ended, one_leaf, solve, start, upload};
 use nestrad_tests::desk::Desk;
@@ -112,7 +112,7 @@ fn two_clients_at_once_get_each_their_own() {
 #[test]
 fn another_sun_needs_no_second_upload_of_the_geometry() {
     let (desk, master) = (Desk::new(), Master::start(&[]));
-    let problem = desk.problem("scene.toml");
+    let scene = desk.scene("scene.toml");
     block_on(async {
         let mut client = client(&master);
         let first = upload(&mut client, one_leaf()).await.unwrap();
@@ -125,8 +125,8 @@ fn another_sun_needs_no_second_upload_of_the_geometry() {
         let second = upload(&mut client, [header]).await.unwrap();
         assert_eq!(first.geometry_id, second.geometry_id);
         assert_ne!(first.scene_id, second.scene_id);
-        for (scene, absorbed_W) in [(first, 50.0), (second, 25.0)] {
-            let id = start(&mut client, &scene.scene_id, v1::SolveOptions::default()).await;
+        for (uploaded, absorbed_W) in [(first, 50.0), (second, 25.0)] {
+            let id = start(&mut client, &uploaded.scene_id, v1::SolveOptions::default()).await;
             assert_eq!(
                 ended(&mut client, &id).await.state(),
                 v1::SolveState::Finished
@@ -150,8 +150,13 @@ fn another_sun_needs_no_second_upload_of_the_geometry() {
         }
         // and the library's client agrees with the library
         let settings = Settings::default();
-        let there = solve(client, problem.clone(), &settings).await;
-        assert_eq!(there.solution, solving::solve(&problem, &settings).solution);
-        assert_eq!(Arc::strong_count(&problem), 1);
+        let there = solve(client, scene.clone(), &settings).await;
+        assert_eq!(there.solution, solving::solve(&scene, &settings).solution);
+        let held = (
+            Arc::strong_count(&scene.canopy),
+            Arc::strong_count(&scene.optics),
+            Arc::strong_count(&scene.light),
+        );
+        assert_eq!(held, (1, 1, 1));
     });
 }

@@ -6,7 +6,7 @@
 //! Within an organ, light is dealt out by how much of each element is seen (visible points over all of
 //! its points), so a fully lit leaf is evenly lit however few points its elements have.
 //!
-//! A direction gives lit areas ([`lit_areas`]); watts come in with the light of a source.
+//! A direction gives lit areas (`lit_areas.rs`); watts come in with the light of a source.
 
 mod areas;
 mod effort;

@@ -314,4 +314,3 @@ fn gather<L: Lane<N>, const N: usize>(rows: &HalfRows, row: usize, seen: &[L]) -
         }
     }
     sum
-}

@@ -1,20 +1,19 @@
 //! Times and sizes of real jobs.
 
 use std::fmt;
-use std::sync::Arc;
 
 use glam::DVec2;
 use nestrad_common::generate::{Maize, Stand};
-use nestrad_common::problem::Problem;
-use nestrad_master::exchange::{
-    Assembly, BlockOf, JobCounts, JobOf, JobRows, batches, block_message, demand, split,
-};
-use nestrad_master::output::resources::cpu_seconds;
-use nestrad_master::plan::{Aims, Plan, Settings};
-use nestrad_master::world::World;
-use nestrad_proto::packed::{self, Shape};
-use nestrad_tests::canopies::{par_and_nir, problem, uniform_sky};
-use nestrad_worker::Demand;
+use nestrad_common::scene::Scene;
+use nestrad_engine::exchange::{Assembly, BlockOf, JobCounts, JobOf, JobRows, Work, demand};
+use nestrad_engine::frame::Frame;
+use nestrad_engine::plan::{Aims, Settings};
+use nestrad_engine::stopwatch::cpu_seconds;
+use nestrad_kernel::packed::{self, Shape};
+use nestrad_kernel::{Demand, PackedRows, Tracer, trace};
+use nestrad_proto::{near_field, v1};
+use nestrad_tests::canopies::{par_and_nir, scenery, uniform_sky};
+use nestrad_tests::solving::{aimed, frame};
 use prost::Message;
 
 /// A job as it was measured.
@@ -58,7 +57,7 @@ pub(crate) struct Field {
 }
 
 /// Rows of maize, on one half of the ground or all of it.
-fn canopy(rows: u32, dense: bool) -> Problem {
+fn canopy(rows: u32, dense: bool) -> Scene {
     let mut field = Maize {
         stand: Stand {
             rows,
@@ -75,13 +74,13 @@ fn canopy(rows: u32, dense: bool) -> Problem {
         // the pattern is twice as wide as what grows on it
         field.pattern.size_m *= DVec2::new(2.0, 1.0);
     }
-    problem(&field, &par_and_nir(), uniform_sky(4, 2))
+    scenery(&field, &par_and_nir(), uniform_sky(4, 2)).scene()
 }
 
 impl Recorded {
     /// Computes the jobs of a batch, and every so many of the others, each on one thread.
     pub(crate) fn measure(field: Field, every: usize) -> Self {
-        let problem = canopy(field.rows, field.dense);
+        let scene = canopy(field.rows, field.dense);
         let settings = Settings {
             accuracy_percent: field.accuracy_percent,
             // jobs are recorded, not solved with
@@ -95,32 +94,31 @@ impl Recorded {
                 .max(0.5),
             ..Aims::of(settings.accuracy_percent)
         };
-        let plan = Plan::aimed(&problem, &settings, &aims).unwrap();
-        let (world, sampling) = (plan.world(&problem), plan.sampling.unwrap());
-        let blocks = [BlockOf::whole(&world)];
-        let batches = batches(&sampling);
-        let of = split(&world, &blocks, &batches, &sampling);
-        let encoded = block_message(&problem.scene, &world, &blocks[0]).encode_to_vec();
+        let plan = aimed(&scene, &settings, &aims).trace;
+        let (frame, sampling) = (frame(&scene.canopy, &plan), plan.sampling.unwrap());
+        let work = Work::split(&frame, &sampling, vec![BlockOf::whole(&frame)]);
+        let whole = &work.blocks[0];
+        let message = near_field::block_message(&whole.frame(&frame), whole.corners(&frame));
+        let encoded = message.unwrap().encode_to_vec();
         let begun_s = cpu_seconds();
-        let message = nestrad_proto::v1::Block::decode(&encoded[..]).unwrap();
-        let block = nestrad_worker::Block::new(&message).unwrap();
+        let message = v1::Block::decode(&encoded[..]).unwrap();
+        let block = near_field::block(&message).unwrap();
         let ready_s = cpu_seconds() - begun_s;
         let one = rayon::ThreadPoolBuilder::new()
             .num_threads(1)
             .build()
             .unwrap();
         let begun_s = cpu_seconds();
-        let tracer = one.install(|| nestrad_worker::Tracer::new(&block));
+        let tracer = one.install(|| Tracer::new(&block));
         let tree_s = cpu_seconds() - begun_s;
-        let (mut results, mut measured) = (Vec::<(JobOf, JobRows)>::new(), 0);
-        let mut measure = |job: &JobOf| {
-            let batch = job.message(&batches[job.batch as usize]);
+        let (mut results, mut measured) = (Vec::<PackedRows>::new(), 0);
+        let mut measure = |number: usize, job: &JobOf| {
+            let batch = work.batch(number);
             let begun_s = cpu_seconds();
-            let rows = one.install(|| nestrad_worker::trace_packed(&block, || &tracer, &batch));
+            let rows = one.install(|| trace(&block, || &tracer, &batch).packed(&block));
             let took_s = cpu_seconds() - begun_s;
-            let rows = JobRows::from(rows);
             if job.batch == 0 {
-                results.push((job.clone(), rows.clone()));
+                results.push(rows.clone());
             }
             measured += 1;
             Job {
@@ -128,17 +126,17 @@ impl Recorded {
                 cost_s: job.cost_s,
                 took_s,
                 bytes: rows.packed.len() as u64,
-                entries: rows.traced.row_entries,
+                entries: rows.counts.row_entries,
                 rays: batch.rays.is_some(),
             }
         };
         // the first batch whole, as a master joins it; the others take the time and size of the last one of their kind
         let (mut jobs, mut last) = (Vec::new(), [None, None]);
         let mut seen = [0, 0];
-        for job in &of {
+        for (number, job) in work.jobs.iter().enumerate() {
             let kind = usize::from(job.rays.is_some());
             let this = last[kind].filter(|_| job.batch > 0 && seen[kind] % every != 0);
-            let this: Job = this.unwrap_or_else(|| measure(job));
+            let this: Job = this.unwrap_or_else(|| measure(number, job));
             seen[kind] += 1;
             last[kind] = Some(this);
             jobs.push(Job {
@@ -147,14 +145,14 @@ impl Recorded {
                 ..this
             });
         }
-        let [check_s, join_s] = one.install(|| master_s(&world, &blocks, results));
+        let [check_s, join_s] = one.install(|| master_s(&frame, &work, &results));
         Self {
-            triangles: problem.scene.triangles.len(),
+            triangles: scene.canopy.len(),
             measured,
             block_bytes: encoded.len() as u64,
             ready_s,
             tree_s,
-            demand: demand(&world, &blocks[0], &sampling),
+            demand: demand(&frame, whole, &sampling),
             jobs,
             check_s,
             join_s,
@@ -167,26 +165,34 @@ impl Recorded {
 }
 
 /// What a master takes for an entry to check it, and to join it into the rows of its batch.
-fn master_s(world: &World, blocks: &[BlockOf], results: Vec<(JobOf, JobRows)>) -> [f64; 2] {
+fn master_s(frame: &Frame, work: &Work, results: &[PackedRows]) -> [f64; 2] {
     let shape = Shape {
-        rows: world.rows() as u32,
-        ends: world.ends.len() as u32,
+        rows: frame.rows() as u32,
+        ends: frame.ends.len() as u32,
     };
-    let (jobs, rows): (Vec<JobOf>, Vec<JobRows>) = results.into_iter().unzip();
-    let entries: u64 = rows.iter().map(|r| r.traced.row_entries).sum();
+    let entries: u64 = results.iter().map(|r| r.counts.row_entries).sum();
     let begun_s = cpu_seconds();
-    for rows in &rows {
+    for rows in results {
         assert_eq!(blake3::hash(&rows.packed).as_bytes().len(), 32);
-        packed::check(&rows.packed, shape, rows.traced.row_entries).unwrap();
+        packed::check(&rows.packed, shape, rows.counts.row_entries).unwrap();
     }
     let check_s = cpu_seconds() - begun_s;
     // a master joins batch after batch: the first one finds memory that was never touched
-    let second = jobs.iter().map(|job| JobOf {
+    let first = &work.jobs[..results.len()];
+    let second = first.iter().map(|job| JobOf {
         batch: 1,
         ..job.clone()
     });
-    let of_both: Arc<[JobOf]> = jobs.iter().cloned().chain(second).collect();
-    let mut assembly = Assembly::new(world, blocks, of_both, 2);
+    let both = Work {
+        batches: work.batches[..2].to_vec(),
+        jobs: first.iter().cloned().chain(second).collect(),
+        ..work.clone()
+    };
+    let mut assembly = Assembly::new(frame, &both);
+    let rows: Vec<JobRows> = results
+        .iter()
+        .map(|rows| JobRows::Packed(rows.clone().into()))
+        .collect();
     let mut join = |from: usize| {
         let begun_s = cpu_seconds();
         for (job, rows) in rows.iter().enumerate() {
@@ -195,7 +201,7 @@ fn master_s(world: &World, blocks: &[BlockOf], results: Vec<(JobOf, JobRows)>) -
         cpu_seconds() - begun_s
     };
     join(0);
-    let join_s = join(jobs.len());
+    let join_s = join(rows.len());
     let begun_s = cpu_seconds();
     assert!(assembly.finish(JobCounts::default()).is_some());
     let halves_s = 0.5 * (cpu_seconds() - begun_s);

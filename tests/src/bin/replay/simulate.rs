@@ -4,9 +4,7 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BinaryHeap};
 use std::time::Duration;
 
-use nestrad_master::cluster::scheduler::{
-    BlockSpec, Id, JobSpec, Leased, Rules, Scheduler, WorkerFacts,
-};
+use nestrad_cluster::scheduler::{BlockSpec, Id, JobSpec, Leased, Rules, Scheduler, WorkerFacts};
 
 use super::record::Recorded;
 

@@ -24,8 +24,8 @@ pub(super) fn cases() -> Vec<Case> {
             },
         ),
         Case::new(AXIS, "nothing at all", "solved: no light is taken", || {
-            let problem = lit(Scenery::open(), LeafOptics::default(), 0.0);
-            solved(&problem, &coarse())
+            let scene = lit(Scenery::open(), LeafOptics::default(), 0.0);
+            solved(&scene, &coarse())
                 .map(|f| solving(format!("{} organs", f.solution.organs.len())))
         }),
         Case::new(
@@ -39,8 +39,8 @@ pub(super) fn cases() -> Vec<Case> {
                 for _ in 0..100_000 {
                     scenery.triangle("leaf 2", [DVec3::new(0.3, 0.2, 0.3); 3]);
                 }
-                let problem = lit(scenery, leaf, 0.2);
-                let solution = changed(&problem, &coarse(), |p| p.max_edge_m = 0.1)?.solution;
+                let scene = lit(scenery, leaf, 0.2);
+                let solution = changed(&scene, &coarse(), |p| p.trace.max_edge_m = 0.1)?.solution;
                 near(
                     "albedo",
                     shares(&solution, 0).up,
@@ -62,8 +62,8 @@ pub(super) fn cases() -> Vec<Case> {
                         DVec3::new(0.005 + at(0.7548), 0.005 + at(0.5698), 0.004 + at(0.618));
                     scenery.triangle("leaf 1", flat(foot, DVec2::splat(1e-7)));
                 }
-                let problem = lit(scenery, LeafOptics::symmetric(0.5, 0.5), 1.0);
-                let solution = solved(&problem, &coarse())?.solution;
+                let scene = lit(scenery, LeafOptics::symmetric(0.5, 0.5), 1.0);
+                let solution = solved(&scene, &coarse())?.solution;
                 near("albedo", shares(&solution, 0).up, 1.0, 2e-3)
             },
         ),
@@ -88,8 +88,8 @@ pub(super) fn cases() -> Vec<Case> {
                 for _ in 0..50_000 {
                     scenery.level("leaf 1", DVec3::Z * 0.2, DVec2::ONE);
                 }
-                let problem = lit(scenery, LeafOptics::opaque(0.5), 0.2);
-                refused(solved(&problem, &coarse()), &["GiB", "--memory"])
+                let scene = lit(scenery, LeafOptics::opaque(0.5), 0.2);
+                refused(solved(&scene, &coarse()), &["GiB", "--memory"])
             },
         ),
     ]
@@ -101,8 +101,8 @@ fn many_times(n: usize, leaf: LeafOptics) -> Verdict {
     for _ in 0..n {
         scenery.triangle("leaf 1", flat(DVec3::splat(0.005), DVec2::splat(1e-3)));
     }
-    let problem = lit(scenery, leaf, 0.0);
-    let solution = solved(&problem, &coarse())?.solution;
+    let scene = lit(scenery, leaf, 0.0);
+    let solution = solved(&scene, &coarse())?.solution;
     let balance = &solution.balance[0];
     let absorbed = balance.absorbed_plants_W.value;
     let se = solution

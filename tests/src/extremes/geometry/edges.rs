@@ -2,8 +2,8 @@
 
 use glam::{DVec2, DVec3};
 use nestrad_common::optics::LeafOptics;
-use nestrad_master::plan::Estimator;
-use nestrad_master::solution::ItemLight;
+use nestrad_engine::plan::Estimator;
+use nestrad_engine::solution::ItemLight;
 
 use super::{AXIS, SUN, by, flat, lit};
 use crate::adding::{plates, stack};
@@ -28,8 +28,9 @@ fn standing(bottom_m: f64, x_m: f64, estimator: Estimator) -> Result<ItemLight, 
     scenery.band("B", 0.5, &[("leaf", LeafOptics::symmetric(0.4, 0.3))]);
     scenery.source(from_zenith(45.0, 0.0), SUN);
     scenery.source(from_zenith(30.0, 180.0), SUN);
-    let finished = changed(&scenery.problem, &by(estimator), |p| p.max_edge_m = 0.05)?;
-    Ok(finished.solution.organs[0])
+    let scene = scenery.scene();
+    let solved = changed(&scene, &by(estimator), |p| p.trace.max_edge_m = 0.05)?;
+    Ok(solved.solution.organs[0])
 }
 
 fn same_power(a: ItemLight, b: ItemLight) -> Verdict {
@@ -79,10 +80,9 @@ pub(super) fn cases() -> Vec<Case> {
             "adding of 1 plate",
             move || {
                 let leaf = LeafOptics::symmetric(0.4, 0.5);
-                let mut problem = plates(1, 0.1, leaf, 0.6).problem;
-                problem.scene.soil_z_m = Some(0.1);
-                let solution = changed(&problem, &by(estimator), |plan| {
-                    (plan.max_edge_m, plan.direct_line_area_m2) = (0.1, 5e-6);
+                let scenery = plates(1, 0.1, leaf, 0.6).soil(0.1);
+                let solution = changed(&scenery.scene(), &by(estimator), |plan| {
+                    (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.1, 5e-6);
                 })?
                 .solution;
                 near(
@@ -100,8 +100,9 @@ pub(super) fn cases() -> Vec<Case> {
             move || {
                 let mut scenery = Scenery::periodic(DVec2::new(0.6, 0.4)).soil(0.0);
                 scenery.level("leaf 1", DVec3::new(-0.5, -0.3, 0.3), DVec2::new(1.8, 0.8));
-                let problem = lit(scenery, LeafOptics::symmetric(0.5, 0.5), 1.0);
-                let solution = changed(&problem, &by(estimator), |p| p.max_edge_m = 0.2)?.solution;
+                let scene = lit(scenery, LeafOptics::symmetric(0.5, 0.5), 1.0);
+                let solution =
+                    changed(&scene, &by(estimator), |p| p.trace.max_edge_m = 0.2)?.solution;
                 let (up, closure) = (
                     solution.balance[0].escaped_up_W,
                     solution.balance[0].closure_W,
@@ -130,8 +131,8 @@ pub(super) fn cases() -> Vec<Case> {
             move || {
                 let mut scenery = Scenery::periodic(DVec2::ONE).soil(0.0);
                 scenery.triangle("leaf 1", flat(DVec3::Z, DVec2::splat(size_m)));
-                let problem = lit(scenery, LeafOptics::default(), 0.5);
-                refused(solved(&problem, &coarse()), &["pattern"])
+                let scene = lit(scenery, LeafOptics::default(), 0.5);
+                refused(solved(&scene, &coarse()), &["pattern"])
             },
         ));
     }
@@ -162,7 +163,7 @@ pub(super) fn cases() -> Vec<Case> {
                 scenery.triangle("leaf 1", [foot, foot - d * 0.5, foot + side]);
                 scenery.band("B", 0.5, &[("leaf", LeafOptics::symmetric(0.4, 0.4))]);
                 scenery.source(d, SUN);
-                solved(&scenery.problem, &coarse()).map(|f| f.solution.organs[0])
+                solved(&scenery.scene(), &coarse()).map(|f| f.solution.organs[0])
             };
             let (exact, near_it) = (along(0.0)?, along(1e-9)?);
             all([

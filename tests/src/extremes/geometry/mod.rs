@@ -7,8 +7,8 @@ mod sizes;
 
 use glam::{DVec2, DVec3};
 use nestrad_common::optics::LeafOptics;
-use nestrad_common::problem::Problem;
-use nestrad_master::plan::{Estimator, Settings};
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::{Estimator, Settings};
 
 use super::Case;
 use super::judge::coarse;
@@ -32,10 +32,10 @@ fn flat(at: DVec3, legs: DVec2) -> [DVec3; 3] {
 }
 
 /// Ends a scene: one band and a sun in the zenith.
-fn lit(mut scenery: Scenery, leaf: LeafOptics, soil_albedo: f64) -> Problem {
+fn lit(mut scenery: Scenery, leaf: LeafOptics, soil_albedo: f64) -> Scene {
     scenery.band("B", soil_albedo, &[("leaf", leaf)]);
     scenery.source(-DVec3::Z, SUN);
-    scenery.problem
+    scenery.scene()
 }
 
 pub(super) fn cases() -> Vec<Case> {

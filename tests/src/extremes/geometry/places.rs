@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use nestrad_common::optics::LeafOptics;
-use nestrad_master::plan::Estimator;
+use nestrad_engine::plan::Estimator;
 
 use super::{AXIS, SUN, by, lit};
 use crate::adding::{plates, stack};
@@ -24,9 +24,9 @@ fn in_one_place(n: usize, leaf: LeafOptics, turn: bool, estimator: Estimator) ->
         }
         scenery.quad(&format!("leaf {k}"), corners);
     }
-    let problem = lit(scenery, leaf, 0.2);
-    let solution = changed(&problem, &by(estimator), |plan| {
-        (plan.max_edge_m, plan.tolerance.absorbed) = (0.3, 1e-6);
+    let scene = lit(scenery, leaf, 0.2);
+    let solution = changed(&scene, &by(estimator), |plan| {
+        (plan.trace.max_edge_m, plan.light.tolerance.absorbed) = (0.3, 1e-6);
     })?
     .solution;
     let expected = stack(n, leaf, 0.2);
@@ -58,10 +58,9 @@ pub(super) fn cases() -> Vec<Case> {
             "adding of 3 plates",
             move || {
                 let leaf = LeafOptics::symmetric(0.45, 0.45);
-                let mut problem = plates(3, 1e-4, leaf, 0.2).problem;
-                problem.scene.soil_z_m = Some(-10.0);
-                let solution = changed(&problem, &by(estimator), |plan| {
-                    (plan.max_edge_m, plan.direct_line_area_m2) = (0.1, 5e-6);
+                let scenery = plates(3, 1e-4, leaf, 0.2).soil(-10.0);
+                let solution = changed(&scenery.scene(), &by(estimator), |plan| {
+                    (plan.trace.max_edge_m, plan.light.direct_line_area_m2) = (0.1, 5e-6);
                 })?
                 .solution;
                 near(
@@ -88,7 +87,7 @@ pub(super) fn cases() -> Vec<Case> {
                 let white = LeafOptics::opaque(1.0);
                 scenery.band("B", 0.0, &[("wall", white)]);
                 scenery.source(from_zenith(40.0, 30.0), SUN);
-                let solution = solved(&scenery.problem, &by(estimator))?.solution;
+                let solution = solved(&scenery.scene(), &by(estimator))?.solution;
                 let inside: Vec<f64> = solution
                     .organs
                     .iter()
@@ -119,8 +118,8 @@ fn flat_leaf_with_t_junctions(estimator: Estimator) -> Verdict {
     scenery.triangle("leaf 1", [at(0., 0.), at(1., 0.), at(0., 1.)]);
     scenery.triangle("leaf 1", [at(1., 0.), at(1., 1.), at(0.5, 0.5)]);
     scenery.triangle("leaf 1", [at(1., 1.), at(0., 1.), at(0.5, 0.5)]);
-    let problem = lit(scenery, LeafOptics::opaque(0.9), 0.0);
-    let item = solved(&problem, &by(estimator))?.solution.organs[0];
+    let scene = lit(scenery, LeafOptics::opaque(0.9), 0.0);
+    let item = solved(&scene, &by(estimator))?.solution.organs[0];
     all([
         near("lower", item.irradiance_lower_W_m2, 0.0, 0.0),
         within_se("power/W", item.absorbed_W, 0.1 * SUN, item.absorbed_se_W),
@@ -143,8 +142,8 @@ fn crossing(estimator: Estimator) -> Verdict {
         "leaf 2",
         [mirrored[1], mirrored[0], mirrored[3], mirrored[2]],
     );
-    let problem = lit(scenery, LeafOptics::symmetric(0.4, 0.4), 0.0);
-    let organs = solved(&problem, &by(estimator))?.solution.organs;
+    let scene = lit(scenery, LeafOptics::symmetric(0.4, 0.4), 0.0);
+    let organs = solved(&scene, &by(estimator))?.solution.organs;
     let [a, b] = [organs[0], organs[1]];
     let se = a.absorbed_se_W.hypot(b.absorbed_se_W);
     within_se("power/W", a.absorbed_W, b.absorbed_W, se)

@@ -2,7 +2,7 @@
 
 use glam::{DVec2, DVec3};
 use nestrad_common::optics::LeafOptics;
-use nestrad_master::plan::Estimator;
+use nestrad_engine::plan::Estimator;
 
 use super::{AXIS, SUN, by, flat, lit};
 use crate::adding::stack;
@@ -38,8 +38,8 @@ fn lower_face_sees_the_plate(small: [DVec3; 3], plate_m: f64, estimator: Estimat
     scenery.triangle("leaf 1", small);
     let corner = DVec3::new(-0.5, -0.5, -1e-3 / plate_m) * plate_m;
     scenery.level("leaf 2", corner, DVec2::splat(plate_m));
-    let problem = lit(scenery, LeafOptics::symmetric(rho, 0.0), 0.0);
-    let item = solved(&problem, &by(estimator))?.solution.organs[0];
+    let scene = lit(scenery, LeafOptics::symmetric(rho, 0.0), 0.0);
+    let item = solved(&scene, &by(estimator))?.solution.organs[0];
     near("lower/upper", item.irradiance_lower_W_m2 / SUN, rho, 0.05)
 }
 
@@ -98,13 +98,13 @@ pub(super) fn cases() -> Vec<Case> {
                     let at = DVec3::new(0.0, 1e-2 * f64::from(k), 0.5);
                     scenery.triangle(&format!("leaf {k}"), flat(at, DVec2::new(1.0, 1e-6)));
                 }
-                let problem = lit(scenery, LeafOptics::symmetric(0.4, 0.4), 0.2);
-                let finished = solved(&problem, &coarse())?;
-                let elements = finished.counters.elements;
+                let scene = lit(scenery, LeafOptics::symmetric(0.4, 0.4), 0.2);
+                let solved = solved(&scene, &coarse())?;
+                let elements = solved.work.elements;
                 if elements > 200_000 {
                     return Err(format!("{elements} elements"));
                 }
-                near("albedo", shares(&finished.solution, 0).up, 0.2, 1e-3)
+                near("albedo", shares(&solved.solution, 0).up, 0.2, 1e-3)
             },
         ),
         Case::new(
@@ -120,8 +120,8 @@ pub(super) fn cases() -> Vec<Case> {
                 ];
                 scenery.triangle("leaf 1", line);
                 scenery.level("leaf 2", DVec3::Z * 0.5, DVec2::ONE);
-                let problem = lit(scenery, LeafOptics::symmetric(0.4, 0.4), 0.2);
-                let solution = changed(&problem, &coarse(), |p| p.max_edge_m = 0.1)?.solution;
+                let scene = lit(scenery, LeafOptics::symmetric(0.4, 0.4), 0.2);
+                let solution = changed(&scene, &coarse(), |p| p.trace.max_edge_m = 0.1)?.solution;
                 let albedo = stack(1, LeafOptics::symmetric(0.4, 0.4), 0.2).albedo;
                 all([
                     near("albedo", shares(&solution, 0).up, albedo, 1e-3),
