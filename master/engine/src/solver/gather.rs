@@ -314,3 +314,4 @@ fn gather<L: Lane<N>, const N: usize>(rows: &HalfRows, row: usize, seen: &[L]) -
         }
     }
     sum
+}
