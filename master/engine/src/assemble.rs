@@ -187,7 +187,7 @@ impl Parts<'_> {
         }
         let radiosity = outer_soil_radiosity_W_m2(self.optics, self.sources, b);
         let seen_m2 = |row: usize| {
-            self.frame.row_area_m2(row) * self.outlook.exposed[row] * self.outlook.outer_soil[row]
+            self.frame.row_area_m2(row) * self.outlook.exposed[row] * self.outlook.outer_soil(row)
         };
         radiosity * (0..self.frame.rows()).map(seen_m2).sum::<f64>()
     }
@@ -206,14 +206,11 @@ impl Parts<'_> {
         let mut sum = [0.0; 2];
         for (half, irradiance) in self.irradiance.halves.iter().enumerate() {
             let on = |row: usize| irradiance[row * self.irradiance.bands + k];
-            let (to_sky, to_void) = (
-                &self.outlook.to_sky[1 - half],
-                &self.outlook.to_void[1 - half],
-            );
+            let to_sky = &self.outlook.to_sky[1 - half];
             let mut add = |row: usize, radiosity: f64| {
                 let power = 0.5 * radiosity * frame.row_area_m2(row) * self.outlook.exposed[row];
                 sum[0] += power * to_sky[row];
-                sum[1] += power * to_void[row];
+                sum[1] += power * self.outlook.to_void(1 - half, row);
             };
             for (e, &t) in frame.triangle_of_element.iter().enumerate() {
                 let optics = band.materials[frame.material[t as usize] as usize];

@@ -22,6 +22,7 @@ use crate::exchange::{
 };
 use crate::far_field::start::fixed_radiosity_W_m2;
 use crate::frame::Frame;
+use crate::heap::Freed;
 use crate::lit_canopy::LitCanopy;
 use crate::plan::{LightPlan, Plan, TracePlan};
 use crate::progress::Progress;
@@ -115,6 +116,9 @@ impl TracedCanopy {
         } else {
             (here(run, watch)?, there(run)?)
         };
+        if frame.rows() > MANY_ROWS {
+            Freed::default().give_back();
+        }
         let scattering = exchange.map(|exchange| Scattering {
             outlook: Outlook::of(&frame, &exchange),
             exchange,
@@ -343,6 +347,10 @@ impl Look {
         }
     }
 }
+
+/// With more rows than this, memory that tracing has freed is given back before the solver takes its own: 280 MB of
+/// 2.8 GB for a million triangles. It takes milliseconds, which a small canopy does not.
+const MANY_ROWS: usize = 100_000;
 
 /// Part of the incoming light that may be missing, whatever is stated of it.
 const MAY_BE_MISSING: f64 = 0.05;

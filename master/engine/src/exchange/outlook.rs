@@ -16,10 +16,10 @@ pub struct Outlook {
     pub exposed: Vec<f64>,
     /// The part of what each row sends out that leaves to the sky, by the lines of each half.
     pub to_sky: [Vec<f64>; 2],
-    /// The part that leaves downwards, or to the soil beyond the map.
-    pub to_void: [Vec<f64>; 2],
-    /// The part of what each row sees that is soil beyond the map of an open scene.
-    pub outer_soil: Vec<f64>,
+    /// The part that leaves downwards, or to the soil beyond the map; empty where there is neither.
+    to_void: [Vec<f64>; 2],
+    /// The part of what each row sees that is soil beyond the map of an open scene; empty where there is none.
+    outer_soil: Vec<f64>,
     /// Rows none of whose lines count, and how many of their lines are buried.
     blind: Vec<(u32, usize)>,
 }
@@ -40,6 +40,7 @@ impl Outlook {
                     .collect::<Vec<f64>>()
             })
         };
+        let any = |of: fn(&Seen) -> usize| seen.iter().flatten().any(|s| of(s) > 0);
         let blind = |(row, [a, b]): (u32, &[Seen; 2])| {
             (a.counted + b.counted == 0).then_some((row, a.buried + b.buried))
         };
@@ -54,13 +55,30 @@ impl Outlook {
                 })
                 .collect(),
             to_sky: part(|s| s.sky),
-            to_void: part(|s| s.void),
-            outer_soil: seen
-                .iter()
-                .map(|[a, b]| per(a.outer + b.outer, a.counted + b.counted))
-                .collect(),
+            to_void: if any(|s| s.void) {
+                part(|s| s.void)
+            } else {
+                Default::default()
+            },
+            outer_soil: if any(|s| s.outer) {
+                seen.iter()
+                    .map(|[a, b]| per(a.outer + b.outer, a.counted + b.counted))
+                    .collect()
+            } else {
+                Vec::new()
+            },
             blind: (0..).zip(&seen).filter_map(blind).collect(),
         }
+    }
+
+    /// The part of what a row sends out that leaves downwards or to the soil beyond the map, by the lines of a half.
+    pub fn to_void(&self, half: usize, row: usize) -> f64 {
+        self.to_void[half].get(row).copied().unwrap_or(0.0)
+    }
+
+    /// The part of what a row sees that is soil beyond the map of an open scene.
+    pub fn outer_soil(&self, row: usize) -> f64 {
+        self.outer_soil.get(row).copied().unwrap_or(0.0)
     }
 
     /// The same where a source shines on the rows of which `lit` holds.

@@ -41,9 +41,52 @@ pub struct HalfRows {
     /// Start of each row in `ends`, and the length of `ends` at the end.
     start: Vec<u64>,
     /// Where the entries of each batch end in a row, from the row's start: `row * batches + batch`.
-    batch_end: Vec<u32>,
+    batch_end: BatchEnds,
     /// What is seen, one entry per line or ray; by row, then by batch.
     ends: Vec<u32>,
+}
+
+/// Places within a row. Rows are short, and there are millions.
+#[derive(Clone, Debug, PartialEq)]
+enum BatchEnds {
+    /// No row has more than 65,535 entries.
+    Short(Vec<u16>),
+    /// One has.
+    Long(Vec<u32>),
+}
+
+impl Default for BatchEnds {
+    fn default() -> Self {
+        Self::Short(Vec::new())
+    }
+}
+
+impl BatchEnds {
+    /// Of batches of so many rows.
+    fn of(batches: &[BatchRows], rows: usize) -> Self {
+        let ends = (0..rows).flat_map(|row| {
+            batches.iter().scan(0, move |end, batch| {
+                *end += batch.start[row + 1] - batch.start[row];
+                Some(*end)
+            })
+        });
+        let mut short = Vec::with_capacity(rows * batches.len());
+        for end in ends.clone() {
+            match u16::try_from(end) {
+                Ok(end) => short.push(end),
+                Err(_) => return Self::Long(ends.collect()),
+            }
+        }
+        Self::Short(short)
+    }
+
+    #[inline]
+    fn at(&self, place: usize) -> usize {
+        match self {
+            Self::Short(ends) => usize::from(ends[place]),
+            Self::Long(ends) => ends[place] as usize,
+        }
+    }
 }
 
 /// Rows that are joined as one task.
@@ -53,15 +96,12 @@ impl HalfRows {
     /// Joins the batches of a half.
     pub fn join(batches: &[BatchRows]) -> Self {
         let rows = batches.first().map_or(0, |b| b.start.len() - 1);
-        let (mut start, mut batch_end) = (vec![0], Vec::with_capacity(rows * batches.len()));
+        let batch_end = BatchEnds::of(batches, rows);
+        let mut start = Vec::with_capacity(rows + 1);
+        start.push(0);
         let mut total = 0;
         for row in 0..rows {
-            let mut end = 0;
-            for batch in batches {
-                end += batch.start[row + 1] - batch.start[row];
-                batch_end.push(end);
-            }
-            total += u64::from(end);
+            total += batches.iter().map(|b| b.row(row).len()).sum::<usize>() as u64;
             start.push(total);
         }
         let mut ends = vec![0; total as usize];
@@ -112,15 +152,44 @@ impl HalfRows {
     /// Where what a row sees in each batch stands among [`Self::ends`], in order.
     pub fn by_batch(&self, row: usize) -> impl Iterator<Item = Range<usize>> {
         let start = self.start[row] as usize;
-        let end = &self.batch_end[row * self.batches..(row + 1) * self.batches];
-        (0..self.batches).map(move |g| {
-            let first = if g == 0 { 0 } else { end[g - 1] };
-            start + first as usize..start + end[g] as usize
+        let first = row * self.batches;
+        let mut last = start;
+        (first..first + self.batches).map(move |place| {
+            let from = last;
+            last = start + self.batch_end.at(place);
+            from..last
         })
     }
 
     /// Number of entries of all rows.
     pub fn entries(&self) -> u64 {
         self.ends.len() as u64
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rows_are_joined_batch_by_batch_however_long_they_are() {
+        for long in [2, 70_000] {
+            let batches = [
+                BatchRows::new(&[2, long], (0..2 + long).collect()),
+                BatchRows::new(&[0, 1], vec![7]),
+            ];
+            let joined = HalfRows::join(&batches);
+            assert_eq!(
+                joined.batch_end,
+                match long {
+                    2 => BatchEnds::Short(vec![2, 2, 2, 3]),
+                    _ => BatchEnds::Long(vec![2, 2, long, long + 1]),
+                }
+            );
+            let at = 2 + long as usize;
+            assert!(joined.by_batch(0).eq([0..2, 2..2]));
+            assert!(joined.by_batch(1).eq([2..at, at..at + 1]));
+            assert_eq!(joined.ends()[at], 7);
+        }
     }
 }

@@ -97,6 +97,9 @@ impl<'a, const N: usize> Gather<'a, N> {
     /// rows, from the sky on, to `fixed`.
     pub(super) fn start<L: Lane<N>>(&self, half: &mut Half<L>, fixed: &[L]) {
         half.radiosity.clear();
+        // memory that is aligned to cache lines cannot grow in place: there would be two of it for a while
+        half.radiosity
+            .reserve_exact(self.frame.rows() + fixed.len());
         half.radiosity.resize(self.frame.rows(), L::of([0.0; N]));
         half.radiosity.extend_from_slice(fixed);
         self.scatter(half);

@@ -73,6 +73,11 @@ impl<'a, const N: usize> Pass<'a, N> {
         self.y.irradiance.clone()
     }
 
+    /// The radiosities of both halves; all else is freed.
+    pub(super) fn into_radiosities(self) -> [Vec<[f64; N]>; 2] {
+        [self.x.radiosity, self.y.radiosity]
+    }
+
     fn set(&mut self, y: &[[f64; N]], lit: bool) {
         let rows = self.direct.len();
         let others = if lit { &self.fixed } else { &self.dark };

@@ -1,5 +1,7 @@
 //! Group by group of bands: passes until nothing changes any more, then the errors.
 
+use std::mem::take;
+
 use thiserror::Error;
 
 use super::gather::Gather;
@@ -112,6 +114,8 @@ impl Group<'_> {
         if let Some(sample) = &self.system.far_sample {
             all.of_far_field.extend(pass.of_far_field(sample));
         }
+        // what follows takes the most memory of a solve, and needs radiosities alone
+        let mut radiosities = pass.into_radiosities();
         let mut way = Way::default();
         for pair in (0..self.bands.len()).step_by(PULLED_TOGETHER) {
             let bands = &self.bands[pair..(pair + PULLED_TOGETHER).min(self.bands.len())];
@@ -120,11 +124,17 @@ impl Group<'_> {
                 system: self.system,
                 bands,
             };
-            let radiosity = [&pass.x, &pass.y].map(|half| -> Vec<_> {
-                let of = |lane: &[f64; N]| {
-                    std::array::from_fn(|k| lane.get(pair + k).copied().unwrap_or(0.0))
-                };
-                half.radiosity.iter().map(of).collect()
+            let of = |lane: [f64; N]| {
+                std::array::from_fn(|k| lane.get(pair + k).copied().unwrap_or(0.0))
+            };
+            let is_last = pair + PULLED_TOGETHER >= self.bands.len();
+            let radiosity = radiosities.each_mut().map(|half| -> Vec<_> {
+                if is_last {
+                    // two bands stay where they are
+                    take(half).into_iter().map(of).collect()
+                } else {
+                    half.iter().copied().map(of).collect()
+                }
             });
             for half in 0..2 {
                 self.stop.check()?;

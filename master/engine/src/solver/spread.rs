@@ -241,9 +241,11 @@ impl Spread<'_> {
 
     fn escape(&self, balance: &mut [PerBatch; 4], row: usize, weight: f64, change: &PerBatch) {
         let outlook = self.system.outlook;
-        let part = |of: &[Vec<f64>; 2]| 0.5 * (of[0][row] + of[1][row]);
-        add(&mut balance[2], weight * part(&outlook.to_sky), change);
-        add(&mut balance[3], weight * part(&outlook.to_void), change);
+        let part = |of: &dyn Fn(usize) -> f64| 0.5 * (of(0) + of(1));
+        let to_sky = part(&|half| outlook.to_sky[half][row]);
+        let to_void = part(&|half| outlook.to_void(half, row));
+        add(&mut balance[2], weight * to_sky, change);
+        add(&mut balance[3], weight * to_void, change);
     }
 }
 
