@@ -9,10 +9,12 @@
 //! A direction gives lit areas (`lit_areas.rs`); watts come in with the light of a source.
 
 mod areas;
+mod dealing;
 mod effort;
 mod lit_areas;
 mod outlines;
 mod probe;
+mod projection;
 mod sky;
 
 use nestrad_common::light::{Source, Sources};
@@ -26,8 +28,9 @@ pub use effort::spread_effort;
 use crate::frame::Frame;
 use crate::stop::Stopped;
 use areas::Areas;
-use lit_areas::{LitAreas, Projection, Scratch};
+use lit_areas::{LitAreas, Scratch};
 use probe::Probe;
+use projection::Projection;
 
 /// Uncollided light on everything that has a row.
 #[derive(Clone, Debug, Default)]
@@ -81,7 +84,7 @@ pub fn direct_light(
                     line_area_m2: line_area_m2[k],
                     random: [rng.random(), rng.random(), 0.5],
                 };
-                let lit = LitAreas::of(frame, &areas, &projection, probe.as_ref(), &mut scratch);
+                let lit = projection.lit_areas(frame, &areas, probe.as_ref(), &mut scratch);
                 part.add(frame, optics, &lit, source);
             }
             Ok(part)
