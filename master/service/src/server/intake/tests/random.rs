@@ -4,6 +4,7 @@ use nestrad_proto::v1;
 use proptest::prelude::*;
 use prost::Message;
 
+use super::light::{MATERIALS, band, sky, sun};
 use super::*;
 
 /// Whatever comes is taken in or refused.
