@@ -1,6 +1,7 @@
 //! The study: a reference, then every setting with every seed; what the ledger has is not computed again.
 
 use nestrad_common::scene::Scene;
+use nestrad_engine::causes::causes;
 use nestrad_engine::plan::Aims;
 use nestrad_engine::rounds::RoundsError;
 use nestrad_engine::run::Run;
@@ -153,7 +154,7 @@ pub fn carry_out(
                     Err(RoundsError::Solve(SolveError::Stopped(stopped))) => {
                         return Err(TradeError::Stopped(stopped));
                     }
-                    Err(error) => LedgerLine::Failed(error.to_string()),
+                    Err(error) => LedgerLine::Failed(causes(&error)),
                 };
                 ledger.add(&key, line)?;
                 computed += 1;
