@@ -84,7 +84,16 @@ impl TracedCanopy {
         rows: &dyn RowSource,
         run: &Run,
     ) -> Result<Self, SolveError> {
-        let frame = Frame::new(canopy, &plan.cut())?;
+        Self::trace_frame(Frame::new(canopy, &plan.cut())?, plan, rows, run)
+    }
+
+    /// Traces a canopy in a frame that was made for it.
+    pub fn trace_frame(
+        frame: Frame,
+        plan: &TracePlan,
+        rows: &dyn RowSource,
+        run: &Run,
+    ) -> Result<Self, SolveError> {
         let watch = &mut Stopwatch::start();
         let (traced, ()) = Self::of_frame(frame, plan, (rows, run, watch), |_, _, _| Ok(()))?;
         Ok(traced)

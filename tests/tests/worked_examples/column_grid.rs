@@ -4,11 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec2;
 use nestrad_common::canopy::Pattern;
-use nestrad_engine::exchange::{RowSource, ThisProcess};
+use nestrad_engine::exchange::ThisProcess;
 use nestrad_engine::frame::{Cut, Frame};
 use nestrad_engine::plan::Plan;
 use nestrad_engine::solution::Solution;
-use nestrad_engine::stopwatch::Stopwatch;
 use nestrad_engine::traced::TracedCanopy;
 use nestrad_kernel::far_grid::{FarGrid, InLayers, Levels, Passage, SharedFarGrid};
 use nestrad_tests::solving::{finish, plan, sources, unwatched};
@@ -69,13 +68,8 @@ fn lit_with(grid: SharedFarGrid, plan: &Plan) -> Solution {
     let frame = Frame::new(&scene.canopy, &cut).unwrap();
     let sources = sources(&scene, &plan.aims, plan.light.seed);
     unwatched(|run| {
-        let means = (
-            &ThisProcess::default() as &dyn RowSource,
-            run,
-            &mut Stopwatch::start(),
-        );
-        let (traced, ()) =
-            TracedCanopy::of_frame(frame, &plan.trace, means, |_, _, _| Ok(())).unwrap();
+        let traced =
+            TracedCanopy::trace_frame(frame, &plan.trace, &ThisProcess::default(), run).unwrap();
         let lit = traced.lit(&scene.optics, &sources, &plan.light, run);
         lit.unwrap().0
     })

@@ -33,7 +33,7 @@ impl BatchRows {
     }
 }
 
-/// The rows of all batches of a half, joined: a sweep reads each row as one list.
+/// The rows of all batches of a half, joined: a pass reads each row as one list.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HalfRows {
     /// Number of batches.
