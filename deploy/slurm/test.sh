@@ -60,12 +60,26 @@ for port in 16817 17001 17002 17003; do
     ! listening $port || skip "port $port is taken: another cluster runs here"
 done
 
+# start NAME COMMAND...: a daemon of the cluster. A machine on which it does not start, for reasons that it gives
+# itself, has no cluster to test on.
+start() {
+    local name=$1 try
+    shift
+    for try in 1 2 3; do
+        if "$@" >>"$work/$name.start" 2>&1; then return; fi
+        say "$name did not start (try $try of 3):"
+        tail -n 5 "$work/$name.start"
+        sleep 2
+    done
+    skip "$name does not start here"
+}
+
 if [ ! -e /run/munge/munge.socket.2 ] || ! munge -n </dev/null >/dev/null 2>&1; then
     install -d -o munge -g munge -m 0755 /run/munge
     [ -e /etc/munge/munge.key ] || mungekey --create
     chown munge:munge /etc/munge/munge.key
     own_munged=/run/munge/munged.pid
-    runuser -u munge -- munged --force --pid-file="$own_munged" 2>/dev/null
+    start munged runuser -u munge -- munged --force --pid-file="$own_munged"
 fi
 mkdir -p "$work"/{state,run,log,spool/n1,spool/n2,spool/n3}
 cat >"$SLURM_CONF" <<END
@@ -99,8 +113,8 @@ SlurmdParameters=config_overrides
 NodeName=n[1-3] NodeHostname=$(hostname) NodeAddr=127.0.0.1 Port=[17001-17003] CPUs=2 Boards=1 SocketsPerBoard=1 CoresPerSocket=2 ThreadsPerCore=1 RealMemory=4000 State=UNKNOWN
 PartitionName=debug Nodes=n[1-3] Default=YES MaxTime=INFINITE State=UP OverSubscribe=NO
 END
-slurmctld -f "$SLURM_CONF" 2>/dev/null
-for node in n1 n2 n3; do slurmd -f "$SLURM_CONF" -N $node 2>/dev/null; done
+start slurmctld slurmctld -f "$SLURM_CONF"
+for node in n1 n2 n3; do start "slurmd-$node" slurmd -f "$SLURM_CONF" -N $node; done
 idle() { [ "$(sinfo --noheader --Node --format=%T 2>/dev/null | grep -cx idle)" -eq "$1" ]; }
 within 20 'three idle nodes' idle 3
 say 'slurmctld and three slurmd are up'
