@@ -31,6 +31,7 @@ pub mod part;
 mod rays;
 pub mod rows;
 pub mod soil;
+mod touch;
 pub mod world;
 pub mod zbuffer;
 
