@@ -21,6 +21,7 @@ pub mod directions;
 pub mod elements;
 pub mod ends;
 pub mod far_grid;
+pub mod ground;
 pub mod job;
 mod kernel;
 pub mod lattice;
