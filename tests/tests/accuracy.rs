@@ -160,7 +160,7 @@ fn a_coarse_look_comes_first_where_it_saves() {
     let elements = |aims: &Aims| aims.elements_percent;
     let (own, without) = (elements(&reached.plan.aims), elements(&Aims::of(0.3)));
     assert!(own > without, "{own} {without}");
-    // where what is planned does not fit, what the look comes to has to do
+    // where what is planned does not fit, the best that does has to do
     let little = Settings {
         memory_GiB: 0.8 * plan(&scene, &asked(0.3)).memory.total_GiB(),
         ..asked(0.3)
@@ -168,7 +168,15 @@ fn a_coarse_look_comes_first_where_it_saves() {
     assert!(try_plan(&scene, &little).is_err());
     let accuracy = reach(&scene, &little).accuracy;
     assert_eq!(accuracy.ended, Ended::BeyondLimits, "{accuracy:?}");
-    assert_eq!(accuracy.rounds.len(), 1, "{accuracy:?}");
+    let reached: Vec<f64> = accuracy
+        .rounds
+        .iter()
+        .filter_map(|r| r.reached_percent)
+        .collect();
+    assert!(
+        reached.len() > 1 && reached.is_sorted_by(|a, b| a > b),
+        "{accuracy:?}"
+    );
 }
 
 /// They were cut four times finer than they are now, and had as few directions as maize: two rounds, of which the

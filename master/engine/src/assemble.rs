@@ -128,7 +128,9 @@ impl Parts<'_> {
                 let (cell, b) = (k / bands, k % bands);
                 Estimate {
                     value: self.irradiance_W_m2(self.frame.ends.soil(cell as u32) as usize, b),
-                    se: self.variances(b).map_or(0.0, |v| v.soil_W2_m4[cell].sqrt()),
+                    se: (self.variances(b).map_or(0.0, |v| v.soil_W2_m4[cell])
+                        + self.direct.soil_variance_W2_m4[k])
+                        .sqrt(),
                 }
             })
             .collect();
@@ -162,6 +164,24 @@ impl Parts<'_> {
         let incoming = self.direct.incoming_W[b] + self.outer_soil_W(b);
         let mut variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
         variance[4] += self.direct.closure_variance_W2[b];
+        let [of_plants, of_soil, scattered, caught] = self.direct.balance_variance_W2[b];
+        variance[0] += of_plants;
+        variance[1] += of_soil;
+        if self.frame.world.extent.periodic {
+            variance[3] += caught;
+        }
+        // of a little more scattered light the same parts leave as of all of it
+        let once_W = self.direct.incoming_W[b]
+            - self.direct.passed_W[b]
+            - self.absorbed_at_once_W(b, solution);
+        for (k, leaving_W) in [(2, up), (3, scattered_down)] {
+            let part = if once_W > 0.0 {
+                (leaving_W / once_W).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            variance[k] += part * part * scattered;
+        }
         let estimate = |value: f64, k: usize| Estimate {
             value,
             se: variance[k].sqrt(),
@@ -175,6 +195,16 @@ impl Parts<'_> {
             escaped_down_W: estimate(down, 3),
             closure_W: estimate(incoming - plants - soil - up - down, 4),
         }
+    }
+
+    /// What plants and soil absorb of uncollided light, W.
+    fn absorbed_at_once_W(&self, b: usize, solution: &Solution) -> f64 {
+        let bands = self.optics.len();
+        let items = solution.organs.iter().skip(b).step_by(bands);
+        let rows = self.frame.ends.faces() as usize..self.frame.rows();
+        let on_soil = rows.map(|row| self.frame.row_area_m2(row) * self.first_W_m2(row, b));
+        items.map(|item| item.absorbed_direct_W).sum::<f64>()
+            + (1.0 - self.optics.bands[b].soil_albedo) * on_soil.sum::<f64>()
     }
 
     /// Power that the soil beyond the map of an open scene sends to what is on it, W.

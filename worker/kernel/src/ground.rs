@@ -130,7 +130,7 @@ impl OuterSoil {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Along {
     /// Of the map's cells.
-    cell: Option<u32>,
+    pub cell: Option<u32>,
     /// Of the zones around it.
     zone: Option<u32>,
 }

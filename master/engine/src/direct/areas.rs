@@ -11,6 +11,8 @@ pub(super) struct Areas {
     triangle_m2: Vec<DVec3>,
     /// Of each organ, m².
     pub(super) organ_m2: Vec<f64>,
+    /// Lower and upper corner of the box around each organ, metres.
+    pub(super) organ_boxes_m: Vec<[DVec3; 2]>,
 }
 
 impl Areas {
@@ -21,9 +23,17 @@ impl Areas {
         for (&organ, area) in frame.organ.iter().zip(&triangle_m2) {
             organ_m2[organ as usize] += area.length();
         }
+        let mut organ_boxes_m = vec![[DVec3::INFINITY, DVec3::NEG_INFINITY]; frame.organs];
+        for (&organ, corners) in frame.organ.iter().zip(frame.soup().triangles()) {
+            let [lo, hi] = &mut organ_boxes_m[organ as usize];
+            for corner in corners {
+                (*lo, *hi) = (lo.min(corner), hi.max(corner));
+            }
+        }
         Self {
             triangle_m2,
             organ_m2,
+            organ_boxes_m,
         }
     }
 

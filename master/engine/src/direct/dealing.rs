@@ -19,7 +19,7 @@ struct Probed {
 }
 
 /// Points that a large element is met by, on average.
-const LARGE: f64 = 4.0;
+pub(super) const LARGE: f64 = 4.0;
 
 /// A direction, and what it is drawn with.
 pub(super) struct Beam<'a> {
@@ -185,13 +185,30 @@ impl Beam<'_> {
             let visible = (scratch.organ[o].seen_m2 / thin.projected_m2[o]).min(1.0);
             let unmet = scratch.organ[o].met == 0;
             let of_it = if unmet { 1.0 } else { visible };
+            let pieces = f64::from(self.frame.elements().divisions[t as usize].pow(2));
+            let of_triangle_m2 = projected_m2.abs() * pieces;
+            // a strip between two rows of points is missed as a whole
+            let is_strip = of_triangle_m2 > LARGE * self.line_area_m2
+                && self
+                    .frame
+                    .elements()
+                    .of(t as usize)
+                    .all(|e| scratch.met[e as usize] == 0);
+            let missed_m2 = if is_strip {
+                of_triangle_m2 * of_it
+            } else {
+                self.line_area_m2
+            };
             let lit = Lit {
                 element: e,
                 upper: projected_m2 > 0.0,
                 area_m2: 0.0,
-                variance_m4: projected_m2.abs() * self.line_area_m2 * of_it,
+                variance_m4: projected_m2.abs() * missed_m2 * of_it,
             };
-            if unmet {
+            if is_strip {
+                // with the other triangle that it is made of
+                areas.unsure.push(self.unsure(&lit, 2.0 * lit.variance_m4));
+            } else if unmet {
                 areas.unsure.push(self.unsure(&lit, lit.variance_m4));
             }
             areas.faces.push(LitFace {

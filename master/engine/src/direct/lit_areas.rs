@@ -4,7 +4,8 @@
 use glam::DVec3;
 use nestrad_kernel::zbuffer::ZBuffer;
 
-use super::outlines::Outline;
+use super::classes::Classes;
+use super::outlines::{Outline, Outlines};
 use super::shadow::Shade;
 use crate::frame::Frame;
 
@@ -21,12 +22,14 @@ pub(super) struct LitAreas {
     pub(super) missed: u64,
     /// Faces; a face may stand here without any lit area, for what is uncertain of it.
     pub(super) faces: Vec<LitFace>,
-    /// Soil cells, and the points that show them.
-    pub(super) soil: Vec<(u32, u32)>,
+    /// Soil cells that are lit.
+    pub(super) soil: Vec<LitCell>,
     /// On the soil around the map of an open scene.
     pub(super) shades: Vec<Shade>,
-    /// Along the outlines of organs.
+    /// Of organs, in order.
     pub(super) outlines: Vec<Outline>,
+    /// Of the scene as a whole.
+    pub(super) scene: Vec<Outline>,
     /// Faces whose organs are not known by points.
     pub(super) unsure: Vec<Unsure>,
     /// Of all organs that are probed, perpendicular to the source: area, what is lit of it, and what the lattice
@@ -45,6 +48,16 @@ pub(super) struct LitFace {
     pub(super) variance_m4: f64,
 }
 
+/// A soil cell that is lit.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct LitCell {
+    pub(super) cell: u32,
+    /// Lit area of the ground, over the area of the cell.
+    pub(super) part: f64,
+    /// Variance of that.
+    pub(super) variance: f64,
+}
+
 /// What is uncertain of an organ's lit area.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Unsure {
@@ -61,6 +74,7 @@ pub(super) struct Scratch {
     pub(super) visible: Vec<u32>,
     /// Points that meet each element.
     pub(super) met: Vec<u32>,
+    pub(super) outlines: Outlines,
     pub(super) organ: Vec<OfOrgan>,
     pub(super) lit: Vec<Lit>,
 }
@@ -86,11 +100,12 @@ pub(super) struct Lit {
 }
 
 impl Scratch {
-    pub(super) fn new(frame: &Frame) -> Self {
+    pub(super) fn new(frame: &Frame, classes: &Classes) -> Self {
         Self {
             buffer: ZBuffer::default(),
             visible: vec![0; frame.rows()],
             met: vec![0; frame.area_m2.len()],
+            outlines: Outlines::new(classes),
             organ: vec![OfOrgan::default(); frame.organs],
             lit: Vec::new(),
         }

@@ -9,6 +9,7 @@
 //! A direction gives lit areas (`lit_areas.rs`); watts come in with the light of a source.
 
 mod areas;
+mod classes;
 mod dealing;
 mod effort;
 mod lit_areas;
@@ -17,7 +18,10 @@ mod probe;
 mod projection;
 mod shadow;
 mod sky;
+mod systematic;
+mod tally;
 
+use nestrad_common::canopy::Material;
 use nestrad_common::light::{Source, Sources};
 use nestrad_common::optics::Optics;
 use nestrad_kernel::directions::{Purpose, stream};
@@ -29,6 +33,7 @@ pub use effort::spread_effort;
 use crate::frame::Frame;
 use crate::stop::Stopped;
 use areas::Areas;
+use classes::{Classes, Face};
 use lit_areas::{LitAreas, Scratch};
 use probe::Probe;
 use projection::Projection;
@@ -47,6 +52,11 @@ pub struct Direct {
     pub shade_W_m2: Vec<f64>,
     /// Light that comes in, W per band: on the pattern, or on all that an open scene intercepts.
     pub incoming_W: Vec<f64>,
+    /// Variance of what plants absorb, of what the soil absorbs, of what both scatter and of what plants catch of it,
+    /// W² per band.
+    pub balance_variance_W2: Vec<[f64; 4]>,
+    /// Variance of the irradiance of each soil cell, W² m⁻⁴, indexed `cell * bands + band`.
+    pub soil_variance_W2_m4: Vec<f64>,
     /// Variance of how much of the light that comes in is not accounted for, W² per band.
     pub closure_variance_W2: Vec<f64>,
     /// Light that passes an open pattern without soil, W per band.
@@ -71,13 +81,13 @@ pub fn direct_light(
     seed: u64,
     step: impl Fn() -> Result<(), Stopped> + Sync,
 ) -> Result<Direct, Stopped> {
-    let areas = Areas::of(frame);
+    let (areas, classes) = (Areas::of(frame), Classes::of(frame));
     let probe = Probe::new(frame, &areas, (&sources.list, line_area_m2), seed);
     let parts: Result<Vec<Direct>, Stopped> = groups(sources)
         .into_par_iter()
         .map(|group| {
             let mut part = Direct::dark(frame, optics);
-            let mut scratch = Scratch::new(frame);
+            let mut scratch = Scratch::new(frame, &classes);
             for k in group {
                 step()?;
                 let mut rng = stream(seed, Purpose::Direct, k as u64);
@@ -86,9 +96,10 @@ pub fn direct_light(
                     k,
                     towards: -source.direction,
                     line_area_m2: line_area_m2[k],
-                    random: [rng.random(), rng.random(), 0.5],
+                    random: rng.random(),
                 };
-                let lit = projection.lit_areas(frame, &areas, probe.as_ref(), &mut scratch);
+                let lit =
+                    projection.lit_areas(frame, (&areas, &classes), probe.as_ref(), &mut scratch);
                 part.add(frame, optics, &lit, source);
             }
             Ok(part)
@@ -105,6 +116,11 @@ pub fn direct_light(
         add(&mut sum.shade_W_m2, &part.shade_W_m2);
         add(&mut sum.incoming_W, &part.incoming_W);
         add(&mut sum.closure_variance_W2, &part.closure_variance_W2);
+        add(&mut sum.soil_variance_W2_m4, &part.soil_variance_W2_m4);
+        let balances = sum.balance_variance_W2.iter_mut();
+        for (sum, part) in balances.zip(&part.balance_variance_W2) {
+            sum.iter_mut().zip(part).for_each(|(a, b)| *a += b);
+        }
         add(&mut sum.passed_W, &part.passed_W);
         sum.lines += part.lines;
     }
@@ -133,6 +149,8 @@ impl Direct {
             shade_W_m2: vec![0.0; frame.ends.outer_zones as usize * bands],
             incoming_W: vec![0.0; bands],
             closure_variance_W2: vec![0.0; bands],
+            balance_variance_W2: vec![[0.0; 4]; bands],
+            soil_variance_W2_m4: vec![0.0; frame.ends.soil_cells as usize * bands],
             passed_W: vec![0.0; bands],
             lines: 0,
             sky_halves_W: Default::default(),
@@ -157,14 +175,37 @@ impl Direct {
             // perpendicular to the source
             let intensity = source.irradiance_W_m2[b] / lit.towards.z;
             let point_W = intensity * lit.line_area_m2;
-            for outline in &lit.outlines {
-                let variance_W2 = &mut self.organ_variance_W2[outline.organ as usize * bands + b];
-                let contrast = outline.contrast(band);
-                let of_one = outline.variance * (point_W * point_W) * contrast.powi(2);
-                // one by one, so that it does not matter which crossings are counted together
-                for _ in 0..outline.crossings {
-                    *variance_W2 += of_one;
+            let absorptance = |face: Face| match face {
+                Face::Leaf { material, upper } => {
+                    band.materials[material as usize].absorptance(upper)
                 }
+                Face::Soil => 1.0 - band.soil_albedo,
+            };
+            for outlines in lit.outlines.chunk_by(|a, b| a.organ == b.organ) {
+                let variance = outlines::variance(outlines, absorptance);
+                self.organ_variance_W2[outlines[0].organ as usize * bands + b] +=
+                    variance * point_W * point_W;
+            }
+            let is_soil = |face: Face| match face {
+                Face::Leaf { material, .. } => frame.materials[material as usize] == Material::Soil,
+                Face::Soil => true,
+            };
+            let of_kind = |soil: bool| {
+                let worth = |face| {
+                    if is_soil(face) == soil {
+                        absorptance(face)
+                    } else {
+                        0.0
+                    }
+                };
+                outlines::variance(&lit.scene, worth)
+            };
+            let scattered = outlines::variance(&lit.scene, |face| 1.0 - absorptance(face));
+            let caught =
+                outlines::variance(&lit.scene, |face| f64::from(u8::from(face != Face::Soil)));
+            let variances = [of_kind(false), of_kind(true), scattered, caught];
+            for (sum, variance) in self.balance_variance_W2[b].iter_mut().zip(variances) {
+                *sum += variance * point_W * point_W;
             }
             let all = lit.lines - if periodic { 0 } else { lit.missed };
             self.incoming_W[b] += point_W * all as f64;
@@ -205,12 +246,13 @@ impl Direct {
             let absorbed = intensity * material.absorptance(face.upper);
             self.element_variance_W2[element * bands + b] += absorbed * absorbed * face.variance_m4;
         }
-        if let Some(soil) = &frame.world.soil {
-            for &(cell, points) in &lit.soil {
-                let row = frame.ends.soil(cell) as usize;
-                let lit_m2 = f64::from(points) * lit.line_area_m2;
-                self.irradiance_W_m2[row * bands + b] += intensity * lit_m2 / soil.cell_area_m2();
-            }
+        for lit_cell in &lit.soil {
+            let row = frame.ends.soil(lit_cell.cell) as usize;
+            // of the ground
+            let irradiance = intensity * lit.towards.z;
+            self.irradiance_W_m2[row * bands + b] += irradiance * lit_cell.part;
+            self.soil_variance_W2_m4[lit_cell.cell as usize * bands + b] +=
+                irradiance * irradiance * lit_cell.variance;
         }
         for shade in &lit.shades {
             self.shade_W_m2[shade.zone as usize * bands + b] +=

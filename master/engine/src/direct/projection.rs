@@ -7,9 +7,10 @@ use nestrad_kernel::lattice::Lattice;
 use nestrad_kernel::zbuffer::Top;
 
 use super::areas::Areas;
-use super::dealing::Beam;
-use super::lit_areas::{LitAreas, Scratch};
-use super::outlines::Outlines;
+use super::classes::Classes;
+use super::dealing::{Beam, LARGE};
+use super::lit_areas::{LitAreas, LitCell, Scratch};
+use super::outlines::Looking;
 use super::probe::{Probe, Thin};
 use super::shadow::Shadow;
 use crate::frame::Frame;
@@ -23,8 +24,8 @@ pub(super) struct Projection {
     pub(super) towards: DVec3,
     /// Cross-section of a line, m², about.
     pub(super) line_area_m2: f64,
-    /// See [`Lattice::new`].
-    pub(super) random: [f64; 3],
+    /// See [`Lattice::stretched`].
+    pub(super) random: [f64; 4],
 }
 
 impl Projection {
@@ -32,7 +33,7 @@ impl Projection {
     pub(super) fn lit_areas(
         &self,
         frame: &Frame,
-        areas: &Areas,
+        (areas, classes): (&Areas, &Classes),
         probe: Option<&Probe>,
         scratch: &mut Scratch,
     ) -> LitAreas {
@@ -42,20 +43,27 @@ impl Projection {
             random,
             ..
         } = self;
-        let lattice = Lattice::new(towards, &frame.world.extent, line_area_m2, random);
+        let lattice = Lattice::stretched(towards, &frame.world.extent, line_area_m2, random);
         let mut missed = 0u64;
         scratch.clear();
         let mut thin = Thin::of(frame, areas, towards, line_area_m2);
         if probe.is_none() {
             thin.forget();
         }
-        let mut outlines = Outlines::new(frame, &thin.organ, lattice.nx);
+        let looking = Looking {
+            frame,
+            classes,
+            thin: &thin.organ,
+            lattice: &lattice,
+        };
         let Scratch {
             buffer,
             visible,
             met,
+            outlines,
             ..
         } = scratch;
+        outlines.begin(&lattice, &areas.organ_boxes_m);
         let under = Under::of(frame, &lattice);
         let outer = frame.world.outer_soil().zip(frame.world.soil);
         let mut shadow = outer.map(|_| Shadow::new(&lattice));
@@ -67,7 +75,8 @@ impl Projection {
             |element| met[element as usize] += 1,
             |buffer, rows| {
                 let nx = lattice.nx as usize;
-                for (r, j) in rows.clone().enumerate() {
+                for (r, j) in rows.enumerate() {
+                    outlines.row(&looking, j as usize, |i| buffer.top(r * nx + i));
                     for i in 0..nx {
                         let point = r * nx + i;
                         let top = buffer.top(point);
@@ -84,24 +93,18 @@ impl Projection {
                                 None => missed += 1,
                             },
                         }
-                        // neighbours to the right and above, within the strip
-                        let at = [i, j as usize];
-                        if i + 1 < nx {
-                            outlines.beside(top, buffer.top(point + 1), at);
-                        }
-                        if r + 1 < rows.len() {
-                            outlines.above(top, buffer.top(point + nx), at);
-                        }
                     }
                 }
             },
         );
+        let [of_organs, of_scene] = outlines.finish(&looking);
         let mut lit = LitAreas {
             towards,
             line_area_m2: lattice.line_area_m2,
             lines: lattice.lines() as u64,
             missed,
-            outlines: outlines.finish(),
+            outlines: of_organs,
+            scene: of_scene,
             ..LitAreas::default()
         };
         let beam = Beam {
@@ -115,11 +118,7 @@ impl Projection {
             beam.probe(probe, &thin, scratch, &mut lit);
         }
         beam.deal_out(&thin, scratch, &mut lit);
-        let cells = (0..frame.ends.soil_cells).map(|cell| {
-            let row = frame.ends.soil(cell) as usize;
-            (cell, scratch.visible[row])
-        });
-        lit.soil = cells.filter(|&(_, points)| points > 0).collect();
+        lit.soil = under.lit_cells(&lattice, &scratch.visible);
         if let Some((shadow, (outer, soil))) = shadow.zip(outer) {
             lit.shades = shadow.on(&outer, &lattice, soil.z_m);
         }
@@ -157,5 +156,42 @@ impl<'a> Under<'a> {
         let ground = self.ground.as_ref()?;
         let end = ground.end(self.column[i], self.row[j as usize]) as usize;
         (end < self.frame.rows()).then_some(end)
+    }
+
+    /// The cells that are lit. A cell that the lattice meets often is lit by the part of its points that see the
+    /// source, so a cell in full light has just that; the others by the area of the points that show them.
+    fn lit_cells(&self, lattice: &Lattice, visible: &[u32]) -> Vec<LitCell> {
+        let Some(soil) = &self.frame.world.soil else {
+            return Vec::new();
+        };
+        let points_along = |axis: usize, along: &[Along]| {
+            let mut points = vec![0u32; soil.cells[axis] as usize];
+            for cell in along.iter().filter_map(|along| along.cell) {
+                points[cell as usize] += 1;
+            }
+            points
+        };
+        let (across, along) = (points_along(0, &self.column), points_along(1, &self.row));
+        let of_point = lattice.line_area_m2 / (lattice.direction.z * soil.cell_area_m2());
+        let cells = (0..self.frame.ends.soil_cells).map(|cell| {
+            let [column, row] = [cell % soil.cells[0], cell / soil.cells[0]];
+            let met = f64::from(across[column as usize] * along[row as usize]);
+            let seen = f64::from(visible[self.frame.ends.soil(cell) as usize]);
+            let (part, variance) = if LARGE * of_point < 1.0 && met > 0.0 {
+                let part = seen / met;
+                // binomial, for the points that meet it
+                (part, part * (1.0 - part) / met)
+            } else {
+                (seen * of_point, seen.max(1.0) * of_point * of_point)
+            };
+            LitCell {
+                cell,
+                part,
+                variance,
+            }
+        });
+        cells
+            .filter(|lit| lit.part > 0.0 || lit.variance > 0.0)
+            .collect()
     }
 }

@@ -75,6 +75,31 @@ pub struct Lattice {
     pub(crate) touch_m: f64,
 }
 
+/// Lines that fill an extent, and how many of them along y.
+fn wanted(direction: DVec3, extent: &Extent, line_area_m2: f64) -> (f64, f64) {
+    let d = direction;
+    let (_, size) = extent.sheared(DVec2::new(d.x / d.z, d.y / d.z));
+    // Cross-sections stay close to squares: what a slanted direction stretches is the step
+    // along its azimuth.
+    let side = line_area_m2.sqrt();
+    let horizontal = d.x * d.x + d.y * d.y;
+    let along_x = if horizontal > 0.0 {
+        d.x * d.x / horizontal
+    } else {
+        0.5
+    };
+    let lines = size.x * size.y * d.z / line_area_m2;
+    let mut wanted_y = (size.y / (side * d.z.powf(along_x - 1.0))).clamp(1.0, MAX_SIDE);
+    if !extent.periodic && lines >= FEWEST_ALONG * FEWEST_ALONG {
+        wanted_y = wanted_y.clamp(FEWEST_ALONG, lines / FEWEST_ALONG);
+    }
+    (lines, wanted_y)
+}
+
+/// Natural logarithm of how much longer or shorter the steps of a stretched lattice are, at most: enough that an edge of
+/// ten steps ends anywhere between two rows.
+const STRETCH: f64 = 0.1;
+
 /// The sides of a lattice of `lines` points, of which one is near `wanted_y`.
 fn sides(lines: f64, wanted_y: f64, random: f64) -> [f64; 2] {
     // a pattern that is narrower than a step has one column of all lines, not none of long ones
@@ -123,43 +148,76 @@ impl Lattice {
     /// the rounding of the number of lines, where no lattice comes within a thousandth of it: up or
     /// down at random, so that the expected number is exact. A lattice may be empty.
     pub fn new(direction: DVec3, extent: &Extent, line_area_m2: f64, random: [f64; 3]) -> Self {
+        let (lines, wanted_y) = wanted(direction, extent, line_area_m2);
+        let [nx, ny] = sides(lines, wanted_y, random[2]);
+        // an open lattice that is not aligned with its box has one more point along a side
+        let points = [nx, ny].map(|n| n as u32 + u32::from(!extent.periodic && n > 0.0));
+        let steps = DVec2::new(nx.max(1.0), ny);
+        Self::with((direction, extent), steps, points, [random[0], random[1]])
+    }
+
+    /// A lattice whose steps are up to [`STRETCH`] longer or shorter than those of [`Self::new`], at random, and which
+    /// does not fit the box of an open scene: so the edges of panels stand anywhere between its rows, even where they
+    /// are as large as the scene. `random` are four numbers in [0, 1): the offset in x and y, and how much it is
+    /// stretched along each.
+    pub fn stretched(
+        direction: DVec3,
+        extent: &Extent,
+        line_area_m2: f64,
+        random: [f64; 4],
+    ) -> Self {
+        let (lines, wanted_y) = wanted(direction, extent, line_area_m2);
+        let stretch = |random: f64| (STRETCH * (2.0 * random - 1.0)).exp();
+        let wanted_y = wanted_y.min(lines.max(1.0));
+        let (nx, ny) = (
+            lines / wanted_y * stretch(random[2]),
+            wanted_y * stretch(random[3]),
+        );
+        let steps = DVec2::new(nx, ny).clamp(DVec2::ONE, DVec2::splat(MAX_SIDE));
+        let steps = if extent.periodic {
+            steps.round()
+        } else {
+            steps
+        };
+        // one point for each step that begins in the box, and one at either end
+        let points = [steps.x, steps.y].map(|n| n as u32 + 2 * u32::from(!extent.periodic));
+        Self::with((direction, extent), steps, points, [random[0], random[1]])
+    }
+
+    /// A lattice of so many steps and points along x and y.
+    fn with(
+        (direction, extent): (DVec3, &Extent),
+        steps: DVec2,
+        points: [u32; 2],
+        offset: [f64; 2],
+    ) -> Self {
         let d = direction;
         let shear = DVec2::new(d.x / d.z, d.y / d.z);
         let height = extent.max_m.z - extent.min_m.z;
         let (lo, size) = extent.sheared(shear);
-        // Cross-sections stay close to squares: what a slanted direction stretches is the step
-        // along its azimuth.
-        let side = line_area_m2.sqrt();
-        let horizontal = d.x * d.x + d.y * d.y;
-        let along_x = if horizontal > 0.0 {
-            d.x * d.x / horizontal
-        } else {
-            0.5
-        };
-        let lines = size.x * size.y * d.z / line_area_m2;
-        let mut wanted_y = (size.y / (side * d.z.powf(along_x - 1.0))).clamp(1.0, MAX_SIDE);
-        if !extent.periodic && lines >= FEWEST_ALONG * FEWEST_ALONG {
-            wanted_y = wanted_y.clamp(FEWEST_ALONG, lines / FEWEST_ALONG);
-        }
-        let [nx, ny] = sides(lines, wanted_y, random[2]);
-        let steps_per_m = DVec2::new(nx.max(1.0), ny) / size;
-        // an open lattice that is not aligned with its box has one more point along a side
-        let points = |n: f64| n as u32 + u32::from(!extent.periodic && n > 0.0);
+        let steps_per_m = steps / size;
         // s = (z - z_min) / d.z runs over at most this range
         let s_range = (height / d.z).max(f64::MIN_POSITIVE);
         Self {
             direction: d,
-            nx: points(nx),
-            ny: points(ny),
+            nx: points[0],
+            ny: points[1],
             periodic: extent.periodic,
-            line_area_m2: size.x * size.y * d.z / (nx.max(1.0) * ny),
+            line_area_m2: size.x * size.y * d.z / (steps.x * steps.y),
             steps_per_m,
             shear,
-            offset: DVec2::new(random[0], random[1]) - (lo - shear * extent.min_m.z) * steps_per_m,
+            offset: DVec2::from(offset) - (lo - shear * extent.min_m.z) * steps_per_m,
             s_min_m: extent.min_m.z / d.z,
             s_steps_per_m: S_STEPS / s_range,
             touch_m: touch_m(extent),
         }
+    }
+
+    /// Lattice coordinates of the lower and upper corners of what holds a box.
+    pub fn places_of_box(&self, lo: DVec3, hi: DVec3) -> [DVec2; 2] {
+        let corners = [lo.z, hi.z].map(|z| [lo.with_z(z), hi.with_z(z)].map(|p| self.place(p)));
+        let [[a, b], [c, d]] = corners;
+        [a.min(c), b.max(d)]
     }
 
     /// Number of lines.
