@@ -4,6 +4,7 @@
 
 use nestrad_common::canopy::Organ;
 use nestrad_common::generate::{LeafAngles, Maize, Stand};
+use nestrad_common::options::Diameter;
 use nestrad_common::scene::Scene;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::plan::{Aims, Estimator, Settings};
@@ -136,6 +137,22 @@ fn without_memory_the_best_that_fits_has_to_do() {
     assert_eq!(accuracy.ended, Ended::BeyondLimits, "{accuracy:?}");
 }
 
+/// Direct light was 3.06 of 3.11 %, and there was no second round, because the far field alone was too much.
+#[test]
+fn a_far_field_does_not_keep_a_plan_from_helping_the_rest() {
+    let settings = Settings {
+        diameter: Diameter::Metres(0.4),
+        ..asked(0.5)
+    };
+    let accuracy = reach(&maize(1).scene(), &settings).accuracy;
+    assert_eq!(accuracy.ended, Ended::NoFiner, "{accuracy:?}");
+    assert!(accuracy.rounds.len() > 1, "{accuracy:?}");
+    for parts in &accuracy.errors {
+        let (far, total) = (parts.far_field_percent, parts.total_percent());
+        assert!(total < 1.2 * far.max(0.5), "{accuracy:?}");
+    }
+}
+
 #[test]
 fn the_dark_has_no_error() {
     let mut scenery = maize(1);
@@ -160,23 +177,18 @@ fn a_coarse_look_comes_first_where_it_saves() {
     let elements = |aims: &Aims| aims.elements_percent;
     let (own, without) = (elements(&reached.plan.aims), elements(&Aims::of(0.3)));
     assert!(own > without, "{own} {without}");
-    // where what is planned does not fit, the best that does has to do
+    // where what is planned does not fit, the look is followed by as much as does
     let little = Settings {
         memory_GiB: 0.8 * plan(&scene, &asked(0.3)).memory.total_GiB(),
         ..asked(0.3)
     };
     assert!(try_plan(&scene, &little).is_err());
-    let accuracy = reach(&scene, &little).accuracy;
-    assert_eq!(accuracy.ended, Ended::BeyondLimits, "{accuracy:?}");
-    let reached: Vec<f64> = accuracy
-        .rounds
-        .iter()
-        .filter_map(|r| r.reached_percent)
-        .collect();
-    assert!(
-        reached.len() > 1 && reached.is_sorted_by(|a, b| a > b),
-        "{accuracy:?}"
-    );
+    let reached = reach(&scene, &little);
+    let accuracy = &reached.accuracy;
+    let first = accuracy.rounds[0].reached_percent.unwrap();
+    let last = accuracy.rounds.last().unwrap().reached_percent.unwrap();
+    assert!(last < 0.5 * first, "{accuracy:?}");
+    assert!(reached.plan.memory.total_GiB() <= little.memory_GiB);
 }
 
 /// They were cut four times finer than they are now, and had as few directions as maize: two rounds, of which the

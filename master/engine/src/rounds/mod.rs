@@ -320,7 +320,7 @@ fn within_limits(
 }
 
 /// Parts of the way to finer aims that are tried, of what takes memory.
-const OF_THE_WAY: [f64; 3] = [1.0, 0.5, 0.0];
+const OF_THE_WAY: [f64; 5] = [1.0, 0.9, 0.75, 0.5, 0.0];
 
 /// Whether any part of what is left of a plan would be finer by enough to be worth a round.
 fn is_worth_a_round(last: &Aims, next: &Aims) -> bool {
