@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::canopy::Organ;
 use crate::formats::{FormatError, MAX_COORDINATE, MAX_TRIANGLES, Place};
 use crate::inputs::LightFault;
 use crate::light::sky::SkyError;
@@ -47,17 +48,13 @@ pub enum LoadError {
     },
     /// Two files have an organ of the same name, which would be one row of the results.
     #[error(
-        "{again}: organ {id} of plant {plant} of species {species} is in {first} already; expected every organ in one file: number plants or species through all files"
+        "{again}: {organ} is in {first} already; expected every organ in one file: number plants or species through all files"
     )]
     OrganTwice {
         /// Where it is met again.
         again: Place,
         /// The organ.
-        id: String,
-        /// Its plant.
-        plant: String,
-        /// The plant's species.
-        species: String,
+        organ: Box<Organ>,
         /// Where it is met first.
         first: Place,
     },

@@ -139,12 +139,9 @@ impl Joined {
     fn twice(&self, organ: u32, again: Place) -> LoadError {
         let mut numbers = self.meshes.iter().flat_map(|mesh| &mesh.organ);
         let first = numbers.position(|&number| number == organ);
-        let Organ { species, plant, id } = self.organs[organ as usize].clone();
         LoadError::OrganTwice {
             again,
-            id,
-            plant,
-            species,
+            organ: Box::new(self.organs[organ as usize].clone()),
             first: self.origins.place(first.unwrap_or_default()),
         }
     }

@@ -190,6 +190,13 @@ impl Organ {
     }
 }
 
+impl fmt::Display for Organ {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self { species, plant, id } = self;
+        write!(f, "organ {id} of plant {plant} of species {species}")
+    }
+}
+
 /// What a triangle is made of; a band gives it optical properties.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Material {
