@@ -152,17 +152,43 @@ fn wild_triangle(dice: &mut Dice, earlier: &[[DVec3; 3]]) -> [DVec3; 3] {
     }
 }
 
-/// The geometry of a wild scene as a file, read through the door for all input.
+/// A face in the place of another one: the same, turned over, a rounding or 1e-9 m away, or a part of it.
+fn twin(dice: &mut Dice, [a, b, c]: [DVec3; 3]) -> [DVec3; 3] {
+    let within = |s: f64, t: f64| a + s * (b - a) + t * (c - a);
+    let twin = match dice.below(5) {
+        0 => [a, b, c],
+        1 => [b, c, a],
+        2 => [a, b, c].map(|v| v * (1.0 + f64::EPSILON)),
+        3 => {
+            let normal = (b - a).cross(c - a).normalize_or_zero();
+            [a, b, c].map(|v| v + 1e-9 * normal)
+        }
+        _ => [within(0.1, 0.2), within(0.7, 0.1), within(0.3, 0.6)],
+    };
+    let [a, b, c] = twin;
+    [[a, b, c], [a, c, b]][dice.below(2)]
+}
+
+/// The geometry of a wild scene as a file, read through the door for all input. Of a `doubled` one, every other
+/// triangle has a twin or two in its plane.
 ///
 /// # Errors
 ///
 /// Gives the message of a refusal.
-pub fn wild(seed: u64) -> Result<Scene, String> {
+pub fn wild(seed: u64, doubled: bool) -> Result<Scene, String> {
     let mut dice = Dice(seed);
     let mut triangles: Vec<[DVec3; 3]> = Vec::new();
     for _ in 0..1 + dice.below(12) {
         let triangle = wild_triangle(&mut dice, &triangles);
         triangles.push(triangle);
+    }
+    if doubled {
+        for k in 0..triangles.len() {
+            for _ in 0..dice.below(4) / 2 {
+                let twin = twin(&mut dice, triangles[k]);
+                triangles.push(twin);
+            }
+        }
     }
     let mut text = String::new();
     for (k, triangle) in triangles.iter().enumerate() {

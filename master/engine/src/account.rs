@@ -45,6 +45,10 @@ impl<'a> Accounting<'a> {
         let direct = rms(&|item| self.direct.organ_variance_W2[item]);
         let sky = rms(&|item| self.sky_W2(item));
         let elements = rms(&|item| self.elements(item, bands).map_or(0.0, squared));
+        let soil = rms(&|item| {
+            let ways = self.soil_cells(item, bands);
+            0.5 * ways.into_iter().flatten().map(squared).sum::<f64>()
+        });
         let far = rms(&|item| self.far_field(item, bands).map_or(0.0, squared));
         let part = |b: usize| {
             let [sampling, direct] = [&sampling, &direct].map(|part| part[b].rms_percent);
@@ -58,6 +62,7 @@ impl<'a> Accounting<'a> {
                 direct_percent: direct,
                 sky_percent: of(&sky),
                 elements_percent: of(&elements),
+                soil_percent: of(&soil),
                 far_field_percent: of(&far),
                 solver_percent: 100.0 * left * balance.incoming_W / balance.absorbed_plants_W.value,
             })
@@ -72,8 +77,9 @@ impl<'a> Accounting<'a> {
         let of = |item: usize| {
             let sky = self.sky_W2(item).max(0.0);
             let elements = mean(self.elements(item, bands));
+            let soil = self.soil_cells(item, bands).map(|way| mean(way).powi(2));
             let far = mean(self.far_field(item, bands));
-            (sky + elements * elements + far * far).sqrt()
+            (sky + elements * elements + 0.5 * (soil[0] + soil[1]) + far * far).sqrt()
         };
         (0..solution.organs.len()).map(of).collect()
     }
@@ -97,6 +103,12 @@ impl<'a> Accounting<'a> {
 
     fn elements(&self, item: usize, bands: usize) -> Option<[f64; 2]> {
         self.deviation(&self.irradiance.of_element_size, item, bands)
+    }
+
+    /// In either way of putting cells together.
+    fn soil_cells(&self, item: usize, bands: usize) -> [Option<[f64; 2]>; 2] {
+        let ways = self.irradiance.of_soil_cells.each_ref();
+        ways.map(|way| self.deviation(way, item, bands))
     }
 
     fn far_field(&self, item: usize, bands: usize) -> Option<[f64; 2]> {

@@ -1,12 +1,10 @@
 //! From irradiances of elements to light per organ and triangle, and the energy balance.
 
-use nestrad_common::light::Sources;
 use nestrad_common::optics::{Band, Optics};
 use nestrad_kernel::far_grid::Exit;
 
 use crate::direct::Direct;
 use crate::exchange::Outlook;
-use crate::far_field::start::outer_soil_radiosity_W_m2;
 use crate::frame::Frame;
 use crate::sinks::{SINKS, Sink};
 use crate::solution::{Balance, Estimate, ItemLight, MaterialLight, SoilMap, Solution};
@@ -18,10 +16,10 @@ pub(crate) struct Parts<'a> {
     pub frame: &'a Frame,
     /// In the frame's order.
     pub optics: &'a Optics,
-    /// What shines.
-    pub sources: &'a Sources,
     /// Uncollided light.
     pub direct: &'a Direct,
+    /// See [`outer_soil`](crate::outer_soil).
+    pub outer_soil_W_m2: &'a [f64],
     /// What rows see of the sky.
     pub outlook: &'a Outlook,
     /// Of the bands in `scattering`; the others have direct light only.
@@ -201,15 +199,16 @@ impl Parts<'_> {
 
     /// Power that the soil beyond the map of an open scene sends to what is on it, W.
     fn outer_soil_W(&self, b: usize) -> f64 {
-        let world = &self.frame.world;
-        if world.extent.periodic || world.soil.is_none() || self.solved(b).is_none() {
+        if self.solved(b).is_none() {
             return 0.0;
         }
-        let radiosity = outer_soil_radiosity_W_m2(self.optics, self.sources, b);
-        let seen_m2 = |row: usize| {
-            self.frame.row_area_m2(row) * self.outlook.exposed[row] * self.outlook.outer_soil(row)
-        };
-        radiosity * (0..self.frame.rows()).map(seen_m2).sum::<f64>()
+        let radiosity = self
+            .outer_soil_W_m2
+            .iter()
+            .skip(b)
+            .step_by(self.optics.len());
+        let seen_m2 = &self.outlook.outer_soil_m2;
+        radiosity.zip(seen_m2).map(|(b, seen)| b * seen).sum()
     }
 
     /// Scattered power that leaves the scene upwards and downwards, W.

@@ -21,6 +21,7 @@ pub mod far_field;
 pub mod frame;
 pub mod heap;
 pub mod lit_canopy;
+mod outer_soil;
 pub mod plan;
 pub mod progress;
 pub mod rounds;

@@ -100,6 +100,9 @@ pub struct BandAccount {
     pub sky_percent: f64,
     /// That a radiosity is constant over an element.
     pub elements_percent: f64,
+    /// That the same holds for cells of the soil, and for zones of the soil around them.
+    #[serde(default)]
+    pub soil_percent: f64,
     /// That light from beyond the sphere is that of a mean field.
     pub far_field_percent: f64,
     /// What the solver left undone, at most; the whole of it, not of an organ.
@@ -114,18 +117,20 @@ impl BandAccount {
             self.direct_percent,
             self.sky_percent,
             self.elements_percent,
+            self.soil_percent,
             self.far_field_percent,
         ];
         squares.iter().map(|p| p * p).sum::<f64>().sqrt() + self.solver_percent
     }
 
     /// The parts, with names.
-    pub fn named(&self) -> [(f64, &'static str); 6] {
+    pub fn named(&self) -> [(f64, &'static str); 7] {
         [
             (self.exchange_percent, "exchange"),
             (self.direct_percent, "direct light"),
             (self.sky_percent, "directions of the sky"),
             (self.elements_percent, "size of elements"),
+            (self.soil_percent, "size of soil cells"),
             (self.far_field_percent, "far field"),
             (self.solver_percent, "solver"),
         ]
@@ -144,8 +149,8 @@ impl BandAccount {
 pub struct Solution {
     /// Indexed `organ * bands + band`, organs in the scene's order.
     pub organs: Vec<ItemLight>,
-    /// How far `absorbed_W` of each organ may be off besides its standard error: by the size of elements, by
-    /// the directions of a sky, by the mean field beyond a sphere; W, indexed like `organs`.
+    /// How far `absorbed_W` of each organ may be off besides its standard error: by the size of elements and
+    /// soil cells, by the directions of a sky, by the mean field beyond a sphere; W, indexed like `organs`.
     pub organ_bias_W: Vec<f64>,
     /// Indexed `triangle * bands + band`, triangles in the scene's order.
     pub triangles: Vec<ItemLight>,

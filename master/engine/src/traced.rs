@@ -24,6 +24,7 @@ use crate::far_field::start::fixed_radiosity_W_m2;
 use crate::frame::Frame;
 use crate::heap::Freed;
 use crate::lit_canopy::LitCanopy;
+use crate::outer_soil;
 use crate::plan::{LightPlan, Plan, TracePlan};
 use crate::progress::Progress;
 use crate::run::Run;
@@ -171,6 +172,7 @@ impl TracedCanopy {
         watch: &mut Stopwatch,
     ) -> Result<(Solution, WorkDone), SolveError> {
         let (frame, optics, plan) = (&self.frame, &light.optics, light.plan);
+        let outer_soil_W_m2 = outer_soil::radiosity_W_m2(frame, optics, light.sources, direct);
         let dark = Outlook::default();
         let mut outlook = Cow::Borrowed(&dark);
         let mut irradiance = Irradiance::default();
@@ -193,7 +195,7 @@ impl TracedCanopy {
                 groups: &scattering.groups,
                 far: far.map(|far| &far.rows),
                 direct_W_m2: &direct.irradiance_W_m2,
-                fixed_W_m2: &fixed_radiosity_W_m2(frame, optics, light.sources),
+                fixed_W_m2: &fixed_radiosity_W_m2(frame, optics, light.sources, &outer_soil_W_m2),
                 incoming_W: &direct.incoming_W,
                 far_sample: sample,
             };
@@ -205,8 +207,8 @@ impl TracedCanopy {
         let parts = Parts {
             frame,
             optics,
-            sources: light.sources,
             direct,
+            outer_soil_W_m2: &outer_soil_W_m2,
             outlook: &outlook,
             irradiance: &irradiance,
             scattering: &plan.scattering_bands,

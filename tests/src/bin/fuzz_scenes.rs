@@ -1,5 +1,6 @@
 //! Random scenes through the door for input, `check` and a coarse solve, each with a time limit:
-//! `fuzz_scenes SECONDS [FIRST SEED]`. A scene is its seed; what is found goes into `tests/wild_scenes.rs`.
+//! `fuzz_scenes SECONDS [FIRST SEED]`. Every second scene is a `doubled` one. A scene is its seed; what is found goes
+//! into `tests/wild_scenes.rs`.
 
 #![allow(clippy::print_stderr, reason = "a command that says how far it is")]
 
@@ -8,7 +9,7 @@ use std::process::ExitCode;
 use std::time::{Duration, Instant};
 
 use nestrad_tests::extremes::run;
-use nestrad_tests::extremes::wild::{UNBALANCED, case};
+use nestrad_tests::extremes::wild::{UNBALANCED, case, doubled};
 
 fn main() -> ExitCode {
     let number = |n: usize, default: u64| -> u64 {
@@ -23,7 +24,11 @@ fn main() -> ExitCode {
     );
     let (mut seed, mut refused, mut unbalanced, mut failed) = (first, 0, 0, 0);
     while Instant::now() < end {
-        let row = run(case(seed));
+        let row = run(if seed % 2 == 0 {
+            case(seed)
+        } else {
+            doubled(seed)
+        });
         match &row.verdict {
             Ok(seen) if seen.happens == UNBALANCED => {
                 unbalanced += 1;

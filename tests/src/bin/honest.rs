@@ -47,6 +47,7 @@ fn by_rays(name: &'static str, generated: &Generated) -> Result<Case, Fault> {
         direct_percent: 0.15,
         sky_percent: 0.09,
         elements_percent: 0.2,
+        soil_percent: 0.2,
     };
     let settings = Settings {
         estimator: Estimator::Rays,

@@ -14,11 +14,20 @@ pub const UNBALANCED: &str = "refused as out of balance";
 
 /// A scene by its seed. It need not balance better than so few lines can tell.
 pub fn case(seed: u64) -> Case {
-    case_within(seed, 0.25)
+    case_of(seed, false, 0.25)
+}
+
+/// The same with faces that stand twice, or lie in the plane of another one.
+pub fn doubled(seed: u64) -> Case {
+    case_of(seed, true, 0.25)
 }
 
 /// The same with another limit of memory.
 pub fn case_within(seed: u64, memory_GiB: f64) -> Case {
+    case_of(seed, false, memory_GiB)
+}
+
+fn case_of(seed: u64, doubled: bool, memory_GiB: f64) -> Case {
     Case::new(
         "Wild",
         seed.to_string(),
@@ -30,7 +39,7 @@ pub fn case_within(seed: u64, memory_GiB: f64) -> Case {
                     figure,
                 })
             };
-            let scene = match wild(seed) {
+            let scene = match wild(seed, doubled) {
                 Ok(scene) => scene,
                 Err(fault) => return message(fault),
             };

@@ -36,3 +36,6 @@ pub const Z_POINT_NS: f64 = 75.0;
 /// An element, its lines and rows included: 8 000 ns where lines are dense enough for smaller elements anyway,
 /// 20 000 and more where they have to be denser.
 pub const ELEMENT_NS: f64 = 12_000.0;
+
+/// A soil cell, which has one row, its lines and rays included, ns.
+pub const SOIL_CELL_NS: f64 = 0.5 * ELEMENT_NS + 8.0 * RAY_NS;

@@ -75,6 +75,15 @@ impl Elements {
         self.first[triangle]..self.first[triangle + 1]
     }
 
+    /// The triangle that an element belongs to.
+    pub(crate) fn triangle(&self, element: u32) -> usize {
+        if self.len() == self.divisions.len() {
+            // none is cut
+            return element as usize;
+        }
+        self.first.partition_point(|&first| first <= element) - 1
+    }
+
     /// The triangle that each element belongs to.
     pub fn triangle_of_element(&self) -> Vec<u32> {
         let mut owner = vec![0; self.len()];

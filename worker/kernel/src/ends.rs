@@ -11,6 +11,8 @@ pub struct Ends {
     pub soil_cells: u32,
     /// Ends of the far field; 0 without one.
     pub far_ends: u32,
+    /// Zones of the soil around the map of an open scene; 0 without.
+    pub outer_zones: u32,
 }
 
 /// The side of an element.
@@ -53,7 +55,7 @@ impl Ends {
         self.rows() + 1
     }
 
-    /// The soil beyond the map of an open scene.
+    /// The soil beyond the map of an open scene, and beyond all zones around it.
     pub fn outer_soil(&self) -> u32 {
         self.rows() + 2
     }
@@ -68,9 +70,19 @@ impl Ends {
         self.rows() + 4 + end
     }
 
+    /// A zone of the soil around the map of an open scene.
+    pub fn zone(&self, zone: u32) -> u32 {
+        self.far(self.far_ends) + zone
+    }
+
+    /// Whether an end is soil beyond the map of an open scene, in a zone or beyond all of them.
+    pub fn is_outer_soil(&self, end: u32) -> bool {
+        end == self.outer_soil() || end >= self.zone(0)
+    }
+
     /// All ends.
     pub fn len(&self) -> usize {
-        self.far(self.far_ends) as usize
+        self.zone(self.outer_zones) as usize
     }
 
     /// There is always the sky.

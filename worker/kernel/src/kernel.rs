@@ -5,7 +5,7 @@ use std::sync::{Arc, OnceLock};
 use glam::{DVec2, DVec3};
 
 use crate::block::{BlockFrame, CellRun, TriangleRun};
-use crate::far_grid::Levels;
+use crate::far_grid::{Levels, SharedFarGrid};
 use crate::job::{Batch, Lines, Rays};
 use crate::lattice::Extent;
 use crate::part::Part;
@@ -14,21 +14,22 @@ use crate::world::World;
 use crate::{Block, PackedRows, Tracer, trace};
 
 /// Names the results of this kernel on this machine: the same name, the same bits. It holds a digest of
-/// the packed rows of a small job, so that a change of the kernel or of the format, or a machine whose sine differs in the last
+/// the packed rows of two small jobs, so that a change of the kernel or of the format, or a machine whose sine differs in the last
 /// bit, has another name.
 pub fn kernel() -> &'static str {
     static NAME: OnceLock<String> = OnceLock::new();
     NAME.get_or_init(|| {
-        let rows = sample().unwrap_or_default();
         let mut hasher = blake3::Hasher::new();
-        hasher.update(&rows.packed);
+        for periodic in [true, false] {
+            hasher.update(&sample(periodic).unwrap_or_default().packed);
+        }
         let digest = hasher.finalize().to_hex();
         format!("nestrad {} {}", env!("CARGO_PKG_VERSION"), &digest[..16])
     })
 }
 
-/// Leaves and stems at odd places, over soil, with a far field; lines and rays.
-fn sample() -> Option<PackedRows> {
+/// Leaves and stems at odd places, over soil; lines and rays. With a pattern, there is a far field.
+fn sample(periodic: bool) -> Option<PackedRows> {
     let mut state = 1u64;
     let mut random = || {
         // Knuth's MMIX generator: any will do
@@ -51,12 +52,13 @@ fn sample() -> Option<PackedRows> {
         owned: true,
         solid,
     };
+    let far = Some(Arc::new(Levels { levels: 5, bins: 3 }) as SharedFarGrid);
     let frame = BlockFrame {
         world: World {
             extent: Extent {
                 min_m: DVec3::new(0.0, 0.0, -0.1),
                 max_m: DVec3::new(1.0, 1.0, 1.1),
-                periodic: true,
+                periodic,
             },
             elements: 4 * TRIANGLES as u32,
             soil: Some(SoilGrid {
@@ -65,8 +67,8 @@ fn sample() -> Option<PackedRows> {
                 cell_m: DVec2::splat(0.5),
                 cells: [2, 2],
             }),
-            radius_m: 0.4,
-            far: Some(Arc::new(Levels { levels: 5, bins: 3 })),
+            radius_m: if periodic { 0.4 } else { f64::INFINITY },
+            far: far.filter(|_| periodic),
         },
         runs: (0..TRIANGLES).map(|t| run(t % 3 == 0)).collect(),
         owned_soil: vec![CellRun {
@@ -107,9 +109,11 @@ mod tests {
 
     #[test]
     fn the_sample_exercises_lines_and_rays() {
-        let rows = sample().unwrap();
-        let counts = rows.counts;
-        assert!(counts.segments > 1000 && counts.rays > 1000, "{rows:?}");
+        for periodic in [true, false] {
+            let rows = sample(periodic).unwrap();
+            let counts = rows.counts;
+            assert!(counts.segments > 1000 && counts.rays > 1000, "{rows:?}");
+        }
         assert_eq!(kernel().len(), "nestrad 0.1.0 ".len() + 16);
     }
 }

@@ -21,6 +21,7 @@ pub mod directions;
 pub mod elements;
 pub mod ends;
 pub mod far_grid;
+pub mod ground;
 pub mod job;
 mod kernel;
 pub mod lattice;
@@ -31,6 +32,7 @@ pub mod part;
 mod rays;
 pub mod rows;
 pub mod soil;
+mod touch;
 pub mod world;
 pub mod zbuffer;
 

@@ -70,12 +70,6 @@ impl SoilGrid {
             (k >= 0.0 && k < f64::from(n)).then_some(k as u32)
         }
     }
-
-    /// The cell under a point; `None` beyond the map of an open scene.
-    pub fn cell_at(&self, at_m: DVec2, periodic: bool) -> Option<u32> {
-        let [column, row] = [0, 1].map(|axis| self.along(axis, at_m[axis], periodic));
-        Some(row? * self.cells[0] + column?)
-    }
 }
 
 #[cfg(test)]
@@ -90,14 +84,18 @@ mod tests {
             cell_m: DVec2::new(0.5, 0.25),
             cells: [4, 2],
         };
+        let cell_at = |at_m: DVec2, periodic| {
+            let [column, row] = [0, 1].map(|axis| soil.along(axis, at_m[axis], periodic));
+            Some(row? * soil.cells[0] + column?)
+        };
         for cell in 0..soil.len() {
             let within = soil.corner_m(cell) + 0.4 * soil.cell_m;
             for periodic in [false, true] {
-                assert_eq!(soil.cell_at(within, periodic), Some(cell));
+                assert_eq!(cell_at(within, periodic), Some(cell));
             }
             let away = within + DVec2::new(-2.0 * 7.0, 0.5 * 3.0);
-            assert_eq!(soil.cell_at(away, false), None);
-            assert_eq!(soil.cell_at(away, true), Some(cell));
+            assert_eq!(cell_at(away, false), None);
+            assert_eq!(cell_at(away, true), Some(cell));
         }
         // a hair below the pattern's edge is in its last cell
         assert_eq!(soil.along(0, -1.0 - 1e-17, true), Some(0));

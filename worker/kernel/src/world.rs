@@ -27,6 +27,7 @@ impl World {
             elements: self.elements,
             soil_cells: self.soil.map_or(0, |soil| soil.len()),
             far_ends: self.far.as_ref().map_or(0, |far| far.len()),
+            outer_zones: self.outer_soil().map_or(0, |outer| outer.len()),
         }
     }
 

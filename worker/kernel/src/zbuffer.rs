@@ -4,6 +4,7 @@ use std::ops::Range;
 
 use crate::elements::{self, Elements};
 use crate::lattice::{Lattice, Soup, Strips};
+use crate::touch::{CLOSE, Stacks};
 
 /// The element on top, and the face that it shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +41,7 @@ impl ZBuffer {
     ) {
         let floor = u64::from(floor_m.map_or(0, |z| lattice.depth_of_height(z))) << 32;
         let strips = Strips::new(lattice, soup, LINES_IN_STRIP);
+        let stacks = Stacks::new(lattice, soup, elements);
         let nx = lattice.nx as usize;
         for s in 0..strips.len() {
             let rows = strips.rows(s);
@@ -60,7 +62,13 @@ impl ZBuffer {
                         | u64::from(element + 1) << 1
                         | u64::from(projected.upper_along);
                     let top = &mut self.key[f.line - first_line];
-                    *top = (*top).max(key);
+                    if is_close(key, *top) {
+                        if stacks.is_later(f.line, place(key), place(*top)) {
+                            *top = key;
+                        }
+                    } else {
+                        *top = (*top).max(key);
+                    }
                 });
             });
             strip(self, rows);
@@ -77,4 +85,17 @@ impl ZBuffer {
             upper: key & 1 == 1,
         })
     }
+}
+
+/// Whether two elements are met at close depths.
+#[inline]
+fn is_close(key: u64, top: u64) -> bool {
+    const REACH: u64 = ((CLOSE as u64) + 1) << 32;
+    // soil is no element
+    key.abs_diff(top) < REACH && top as u32 > 1
+}
+
+/// Depth and element.
+fn place(key: u64) -> (u32, u32) {
+    ((key >> 32) as u32, ((key as u32) >> 1) - 1)
 }

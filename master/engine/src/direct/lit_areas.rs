@@ -5,6 +5,7 @@ use glam::DVec3;
 use nestrad_kernel::zbuffer::ZBuffer;
 
 use super::outlines::Outline;
+use super::shadow::Shade;
 use crate::frame::Frame;
 
 /// What a direction lights.
@@ -22,6 +23,8 @@ pub(super) struct LitAreas {
     pub(super) faces: Vec<LitFace>,
     /// Soil cells, and the points that show them.
     pub(super) soil: Vec<(u32, u32)>,
+    /// On the soil around the map of an open scene.
+    pub(super) shades: Vec<Shade>,
     /// Along the outlines of organs.
     pub(super) outlines: Vec<Outline>,
     /// Faces whose organs are not known by points.

@@ -15,6 +15,7 @@ mod lit_areas;
 mod outlines;
 mod probe;
 mod projection;
+mod shadow;
 mod sky;
 
 use nestrad_common::light::{Source, Sources};
@@ -41,6 +42,9 @@ pub struct Direct {
     pub organ_variance_W2: Vec<f64>,
     /// Variance of what each element absorbs of it, W², indexed `element * bands + band`.
     pub element_variance_W2: Vec<f64>,
+    /// Light that plants keep from the soil around the map of an open scene, W m⁻² of a zone of it, indexed
+    /// `zone * bands + band`.
+    pub shade_W_m2: Vec<f64>,
     /// Light that comes in, W per band: on the pattern, or on all that an open scene intercepts.
     pub incoming_W: Vec<f64>,
     /// Variance of how much of the light that comes in is not accounted for, W² per band.
@@ -98,6 +102,7 @@ pub fn direct_light(
         add(&mut sum.irradiance_W_m2, &part.irradiance_W_m2);
         add(&mut sum.organ_variance_W2, &part.organ_variance_W2);
         add(&mut sum.element_variance_W2, &part.element_variance_W2);
+        add(&mut sum.shade_W_m2, &part.shade_W_m2);
         add(&mut sum.incoming_W, &part.incoming_W);
         add(&mut sum.closure_variance_W2, &part.closure_variance_W2);
         add(&mut sum.passed_W, &part.passed_W);
@@ -125,6 +130,7 @@ impl Direct {
             irradiance_W_m2: vec![0.0; frame.rows() * bands],
             organ_variance_W2: vec![0.0; frame.organs * bands],
             element_variance_W2: vec![0.0; frame.area_m2.len() * bands],
+            shade_W_m2: vec![0.0; frame.ends.outer_zones as usize * bands],
             incoming_W: vec![0.0; bands],
             closure_variance_W2: vec![0.0; bands],
             passed_W: vec![0.0; bands],
@@ -205,6 +211,10 @@ impl Direct {
                 let lit_m2 = f64::from(points) * lit.line_area_m2;
                 self.irradiance_W_m2[row * bands + b] += intensity * lit_m2 / soil.cell_area_m2();
             }
+        }
+        for shade in &lit.shades {
+            self.shade_W_m2[shade.zone as usize * bands + b] +=
+                intensity * lit.towards.z * shade.part;
         }
     }
 }

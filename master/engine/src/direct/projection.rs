@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 use nestrad_kernel::ends::Side;
+use nestrad_kernel::ground::{Along, Ground};
 use nestrad_kernel::lattice::Lattice;
 use nestrad_kernel::zbuffer::Top;
 
@@ -10,6 +11,7 @@ use super::dealing::Beam;
 use super::lit_areas::{LitAreas, Scratch};
 use super::outlines::Outlines;
 use super::probe::{Probe, Thin};
+use super::shadow::Shadow;
 use crate::frame::Frame;
 
 /// How a direction is projected.
@@ -54,6 +56,9 @@ impl Projection {
             met,
             ..
         } = scratch;
+        let under = Under::of(frame, &lattice);
+        let outer = frame.world.outer_soil().zip(frame.world.soil);
+        let mut shadow = outer.map(|_| Shadow::new(&lattice));
         buffer.draw(
             &lattice,
             frame.soup(),
@@ -70,9 +75,12 @@ impl Projection {
                             Some(Top { element, upper }) => {
                                 let side = if upper { Side::Upper } else { Side::Lower };
                                 visible[frame.ends.face(element, side) as usize] += 1;
+                                if let Some(shadow) = &mut shadow {
+                                    shadow.meets(i, j as usize);
+                                }
                             }
-                            None => match soil_cell(frame, &lattice, i, j) {
-                                Some(cell) => visible[frame.ends.soil(cell) as usize] += 1,
+                            None => match under.row(i, j) {
+                                Some(row) => visible[row] += 1,
                                 None => missed += 1,
                             },
                         }
@@ -112,12 +120,42 @@ impl Projection {
             (cell, scratch.visible[row])
         });
         lit.soil = cells.filter(|&(_, points)| points > 0).collect();
+        if let Some((shadow, (outer, soil))) = shadow.zip(outer) {
+            lit.shades = shadow.on(&outer, &lattice, soil.z_m);
+        }
         lit
     }
 }
 
-fn soil_cell(frame: &Frame, lattice: &Lattice, i: usize, j: u32) -> Option<u32> {
-    let soil = frame.world.soil.as_ref()?;
-    let at = lattice.point_at(i as f64, f64::from(j), soil.z_m);
-    soil.cell_at(at.truncate(), frame.world.extent.periodic)
+/// The ground under the points of a lattice.
+struct Under<'a> {
+    frame: &'a Frame,
+    ground: Option<Ground>,
+    column: Vec<Along>,
+    row: Vec<Along>,
+}
+
+impl<'a> Under<'a> {
+    fn of(frame: &'a Frame, lattice: &Lattice) -> Self {
+        let ground = Ground::of(&frame.world);
+        let (mut column, mut row) = (Vec::new(), Vec::new());
+        if let Some((ground, soil)) = ground.zip(frame.world.soil) {
+            let at = |i: u32, j: u32| lattice.point_at(f64::from(i), f64::from(j), soil.z_m);
+            column.extend((0..lattice.nx).map(|i| ground.along(0, at(i, 0).x)));
+            row.extend((0..lattice.ny).map(|j| ground.along(1, at(0, j).y)));
+        }
+        Self {
+            frame,
+            ground,
+            column,
+            row,
+        }
+    }
+
+    /// The row of the soil cell; none beyond the map, and where there is no soil.
+    fn row(&self, i: usize, j: u32) -> Option<usize> {
+        let ground = self.ground.as_ref()?;
+        let end = ground.end(self.column[i], self.row[j as usize]) as usize;
+        (end < self.frame.rows()).then_some(end)
+    }
 }

@@ -18,8 +18,9 @@ pub struct Outlook {
     pub to_sky: [Vec<f64>; 2],
     /// The part that leaves downwards, or to the soil beyond the map; empty where there is neither.
     to_void: [Vec<f64>; 2],
-    /// The part of what each row sees that is soil beyond the map of an open scene; empty where there is none.
-    outer_soil: Vec<f64>,
+    /// What all rows together see of the soil beyond the map of an open scene, m²: of each zone of it, and of what
+    /// lies beyond all zones; empty where there is none.
+    pub outer_soil_m2: Vec<f64>,
     /// Rows none of whose lines count, and how many of their lines are buried.
     blind: Vec<(u32, usize)>,
 }
@@ -60,10 +61,8 @@ impl Outlook {
             } else {
                 Default::default()
             },
-            outer_soil: if any(|s| s.outer) {
-                seen.iter()
-                    .map(|[a, b]| per(a.outer + b.outer, a.counted + b.counted))
-                    .collect()
+            outer_soil_m2: if any(|s| s.outer) {
+                outer_soil_m2(frame, exchange, &seen)
             } else {
                 Vec::new()
             },
@@ -74,11 +73,6 @@ impl Outlook {
     /// The part of what a row sends out that leaves downwards or to the soil beyond the map, by the lines of a half.
     pub fn to_void(&self, half: usize, row: usize) -> f64 {
         self.to_void[half].get(row).copied().unwrap_or(0.0)
-    }
-
-    /// The part of what a row sees that is soil beyond the map of an open scene.
-    pub fn outer_soil(&self, row: usize) -> f64 {
-        self.outer_soil.get(row).copied().unwrap_or(0.0)
     }
 
     /// The same where a source shines on the rows of which `lit` holds.
@@ -100,6 +94,27 @@ impl Outlook {
         }
         outlook
     }
+}
+
+/// What all rows see of the soil beyond the map: see [`Outlook::outer_soil_m2`].
+fn outer_soil_m2(frame: &Frame, exchange: &Exchange, seen: &[[Seen; 2]]) -> Vec<f64> {
+    let ends = &frame.ends;
+    let mut sums = vec![0.0; ends.outer_zones as usize + 1];
+    for (row, [a, b]) in seen.iter().enumerate() {
+        if a.outer + b.outer == 0 {
+            continue;
+        }
+        let lines = (a.counted + b.counted, a.buried + b.buried);
+        let area_m2 = frame.row_area_m2(row) * frame.share_above_soil(row) * exposed(lines);
+        let of_a_line = area_m2 * per(1, lines.0);
+        for half in &exchange.halves {
+            for &end in half.row(row).iter().filter(|&&e| ends.is_outer_soil(e)) {
+                let zone = end.checked_sub(ends.zone(0)).unwrap_or(ends.outer_zones);
+                sums[zone as usize] += of_a_line;
+            }
+        }
+    }
+    sums
 }
 
 fn per(part: usize, of: usize) -> f64 {
@@ -137,7 +152,7 @@ impl Seen {
             seen.buried += usize::from(buried);
             seen.counted += usize::from(!buried);
             seen.sky += usize::from(end == ends.sky());
-            let outer = end == ends.outer_soil();
+            let outer = ends.is_outer_soil(end);
             seen.outer += usize::from(outer);
             seen.void += usize::from(outer || end == ends.void());
         }

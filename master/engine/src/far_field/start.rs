@@ -1,4 +1,5 @@
-//! The start of the far field: what the layer model says of its ends, before the solver closes it on the solution.
+//! What the solver begins with of ends that are not rows: of far ends what the layer model says, before the field is
+//! closed on the solution.
 
 use std::f64::consts::PI;
 use std::num::NonZeroUsize;
@@ -51,25 +52,22 @@ fn from_layers(frame: &Frame, optics: &Optics, sources: &[Source]) -> Vec<f64> {
 /// Classes of leaf inclination in the layers: against 900 they change the albedo by less than 2e-5.
 const INCLINATION_CLASSES: u32 = 18;
 
-/// Radiosities of the ends that are not rows, W m⁻², indexed `(end - rows) * bands + band`: dark, but for the
-/// unshaded soil beyond the map of an open scene and the start of the far field.
-pub fn fixed_radiosity_W_m2(frame: &Frame, optics: &Optics, sources: &Sources) -> Vec<f64> {
+/// Radiosities of the ends that are not rows, W m⁻², indexed `(end - rows) * bands + band`: dark, but for the soil
+/// beyond the map of an open scene, which sends out these (see [`outer_soil`](crate::outer_soil)), and the start of
+/// the far field.
+pub fn fixed_radiosity_W_m2(
+    frame: &Frame,
+    optics: &Optics,
+    sources: &Sources,
+    outer_soil_W_m2: &[f64],
+) -> Vec<f64> {
     let (ends, bands) = (&frame.ends, optics.len());
     let mut fixed = vec![0.0; (ends.len() - frame.rows()) * bands];
     let at = |end: u32| (end - ends.rows()) as usize * bands;
-    if frame.world.soil.is_some() && !frame.world.extent.periodic {
-        for b in 0..bands {
-            let radiosity = outer_soil_radiosity_W_m2(optics, sources, b);
-            fixed[at(ends.outer_soil()) + b] = radiosity;
-        }
-    }
-    fixed[at(ends.far(0))..].copy_from_slice(&from_layers(frame, optics, &sources.list));
+    let (of_zones, beyond) = outer_soil_W_m2.split_at(ends.outer_zones as usize * bands);
+    let [first, first_far, first_zone] = [ends.outer_soil(), ends.far(0), ends.zone(0)].map(at);
+    fixed[first..first + beyond.len()].copy_from_slice(beyond);
+    fixed[first_far..first_zone].copy_from_slice(&from_layers(frame, optics, &sources.list));
+    fixed[first_zone..].copy_from_slice(of_zones);
     fixed
-}
-
-/// Radiosity of the unshaded soil beyond the map of an open scene, W m⁻².
-pub fn outer_soil_radiosity_W_m2(optics: &Optics, sources: &Sources, band: usize) -> f64 {
-    let of_source = |source: &Source| source.irradiance_W_m2[band];
-    let incoming: f64 = sources.list.iter().map(of_source).sum();
-    optics.bands[band].soil_albedo * incoming
 }

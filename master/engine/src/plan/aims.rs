@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use nestrad_common::light::sky::directions_for;
 use serde::{Deserialize, Serialize};
 
-use super::DEFAULT_ACCURACY_PERCENT;
+use super::{DEFAULT_ACCURACY_PERCENT, LEAST_ACCURACY_PERCENT};
 
 /// Errors that a plan is made for, percent, as [`crate::solution::BandAccount`] has them; what a scene makes
 /// of them is known when it is solved.
@@ -19,6 +19,14 @@ pub struct Aims {
     pub sky_percent: f64,
     /// Of the size of elements.
     pub elements_percent: f64,
+    /// Of the size of soil cells.
+    #[serde(default = "default_soil_percent")]
+    pub soil_percent: f64,
+}
+
+/// What soil cells were planned for before they were among the aims.
+fn default_soil_percent() -> f64 {
+    DEFAULT_ACCURACY_PERCENT
 }
 
 /// Edges of elements are neither shorter nor longer than this many times those at the default accuracy.
@@ -36,6 +44,8 @@ impl Aims {
             // large elements save little, and their error varies most from scene to scene
             elements_percent: accuracy_percent
                 .min((DEFAULT_ACCURACY_PERCENT * accuracy_percent).sqrt()),
+            // large cells save next to nothing
+            soil_percent: accuracy_percent.min(DEFAULT_ACCURACY_PERCENT),
         }
     }
 
@@ -47,12 +57,45 @@ impl Aims {
             direct_percent: asked.direct_percent.max(2.0),
             sky_percent: asked.sky_percent.max(1.0),
             elements_percent: asked.elements_percent.max(2.0),
+            soil_percent: DEFAULT_ACCURACY_PERCENT,
+        }
+    }
+
+    /// The same with no sampling that no plan can be made for.
+    #[must_use]
+    pub fn not_below_the_least(self) -> Self {
+        Self {
+            exchange_percent: self.exchange_percent.max(LEAST_ACCURACY_PERCENT),
+            direct_percent: self.direct_percent.max(LEAST_ACCURACY_PERCENT),
+            ..self
+        }
+    }
+
+    /// The part of the way from these to finer ones that takes memory; the others go all of it.
+    #[must_use]
+    pub fn towards(&self, finer: &Self, part: f64) -> Self {
+        let on_the_way = |from: f64, to: f64| from * (to / from).powf(part);
+        Self {
+            exchange_percent: on_the_way(self.exchange_percent, finer.exchange_percent),
+            elements_percent: on_the_way(self.elements_percent, finer.elements_percent),
+            soil_percent: on_the_way(self.soil_percent, finer.soil_percent),
+            ..*finer
         }
     }
 
     /// Edges of elements, in parts of those at the default accuracy.
     pub(super) fn coarser_elements(&self) -> f64 {
         (self.elements_percent / DEFAULT_ACCURACY_PERCENT).clamp(FINEST, COARSEST)
+    }
+
+    /// Sides of soil cells, in parts of those at the default accuracy.
+    pub(super) fn coarser_soil_cells(&self) -> f64 {
+        self.soil_percent / DEFAULT_ACCURACY_PERCENT
+    }
+
+    /// Whether a smaller error of elements would be planned with no smaller ones.
+    pub(super) fn has_smallest_elements(&self) -> bool {
+        self.elements_percent <= FINEST * DEFAULT_ACCURACY_PERCENT
     }
 
     /// The same, where edges are not longer than so many times those at the default accuracy.

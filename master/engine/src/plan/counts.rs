@@ -15,6 +15,8 @@ pub struct WorkCounts {
     pub triangles: f64,
     /// Elements that they are cut into.
     pub elements: f64,
+    /// Cells of the soil.
+    pub soil_cells: f64,
     /// Rows of the exchange.
     pub rows: f64,
     /// Directions of the exchange.
@@ -38,12 +40,14 @@ impl WorkCounts {
             .soil_z_m
             .map(|z_m| SoilGrid::over(&extent, z_m, plan.trace.soil_cell_m));
         let elements = Elements::count(canopy.corners_m(), plan.trace.max_edge_m) as f64;
-        let rows = 2.0 * elements + soil.map_or(0.0, |s| f64::from(s.len()));
+        let soil_cells = soil.map_or(0.0, |s| f64::from(s.len()));
+        let rows = 2.0 * elements + soil_cells;
         let areas = plan.light.line_areas_m2(&extent, sources);
         let direct = sources.list.iter().zip(areas);
         let mut counts = Self {
             triangles: canopy.len() as f64,
             elements,
+            soil_cells,
             rows,
             directions: 0.0,
             entries: 0.0,

@@ -8,7 +8,7 @@ use nestrad_kernel::lattice::DEPTH_OF_TOP;
 use super::{PlanError, Scale};
 
 /// The accuracy below which the number of directions would pass a million, percent.
-pub(super) const LEAST_ACCURACY_PERCENT: f64 = 0.01;
+pub const LEAST_ACCURACY_PERCENT: f64 = 0.01;
 
 /// Most copies of the pattern that one triangle may reach into.
 const MOST_PATTERNS: f64 = 1e3;

@@ -30,6 +30,7 @@ use crate::lit_canopy::LitCanopy;
 use crate::solver::Tolerance;
 pub use aims::Aims;
 pub use counts::WorkCounts;
+pub use limits::LEAST_ACCURACY_PERCENT;
 pub use memory::Memory;
 pub use scale::Scale;
 
@@ -98,6 +99,21 @@ pub struct Plan {
     pub memory: Memory,
     /// One line each: what, and the reason.
     pub reasons: Vec<String>,
+}
+
+/// Which parts of a plan are as fine as they get.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct AtFinest {
+    /// Directions of the exchange.
+    pub exchange: bool,
+    /// Pitch of the direct light.
+    pub direct: bool,
+    /// Directions of a built-in sky.
+    pub sky: bool,
+    /// Size of elements.
+    pub elements: bool,
+    /// Size of soil cells.
+    pub soil: bool,
 }
 
 /// How a canopy is traced.
@@ -305,8 +321,8 @@ impl Plan {
         let of_direct = aims.direct_percent / DEFAULT_ACCURACY_PERCENT;
         let edge_m = edge_m.min(radius_m.map_or(f64::INFINITY, |r| r.max(organ_m / FINEST_CUT)));
         let max_edge_m = edge_m * coarser;
-        let soil_cell_m = (0.2 * organ_m).clamp(
-            (scale.ground_area_m2 / MOST_SOIL_CELLS).sqrt(),
+        let soil_cell_m = (0.2 * organ_m * aims.coarser_soil_cells()).clamp(
+            smallest_soil_cell_m(&scale),
             (scale.ground_area_m2 / LEAST_SOIL_CELLS)
                 .sqrt()
                 .max(f64::MIN_POSITIVE),
@@ -364,6 +380,19 @@ impl Plan {
         })
     }
 
+    /// The parts that no plan makes finer.
+    pub fn at_finest(&self) -> AtFinest {
+        let (aims, ground_m2) = (&self.aims, self.scale.ground_area_m2);
+        AtFinest {
+            exchange: aims.exchange_percent <= LEAST_ACCURACY_PERCENT,
+            direct: aims.direct_percent <= LEAST_ACCURACY_PERCENT
+                || self.light.direct_line_area_m2 <= ground_m2 / MOST_DIRECT_LINES,
+            sky: aims.has_most_sky_directions(),
+            elements: aims.has_smallest_elements(),
+            soil: self.trace.soil_cell_m <= smallest_soil_cell_m(&self.scale),
+        }
+    }
+
     /// Planning the exchange for a larger error than this makes it no coarser.
     pub fn coarsest_exchange_percent(&self, canopy: &Canopy) -> f64 {
         sampling::coarsest_percent(canopy, &self.scale)
@@ -372,6 +401,10 @@ impl Plan {
 
 /// An organ of average size is not cut finer than into this many along a side, however small the sphere.
 const FINEST_CUT: f64 = 24.0;
+
+fn smallest_soil_cell_m(scale: &Scale) -> f64 {
+    (scale.ground_area_m2 / MOST_SOIL_CELLS).sqrt()
+}
 
 /// Soil cells, at most and at least.
 const MOST_SOIL_CELLS: f64 = 1e6;

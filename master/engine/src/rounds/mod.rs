@@ -18,7 +18,7 @@ use thiserror::Error;
 use crate::causes::causes;
 use crate::exchange::RowSource;
 use crate::lit_canopy::LitCanopy;
-use crate::plan::{Aims, Plan, PlanError, Settings, WorkCounts};
+use crate::plan::{Aims, AtFinest, Plan, PlanError, Settings, WorkCounts};
 use crate::run::Run;
 use crate::solution::{BandAccount, Solution};
 use crate::stopwatch::Stopwatch;
@@ -94,8 +94,8 @@ pub enum Ended {
     BeyondLimits,
     /// There have been enough.
     OutOfRounds,
-    /// What is left cannot be planned for: the mean field beyond the sphere, or the directions of a sky that were
-    /// given.
+    /// What is left cannot be planned for: the mean field beyond the sphere, the directions of a sky that were
+    /// given, or what is as fine as it gets.
     NoFiner,
     /// A finer one failed.
     Failed,
@@ -203,7 +203,18 @@ pub fn solve_in_rounds(
             aims: plan.aims,
             coarsest_exchange_percent: plan.coarsest_exchange_percent(&scene.canopy),
             errors: &solution.account,
-            sky_is_fixed: scene.light.sky.is_none() || plan.aims.has_most_sky_directions(),
+            fixed: {
+                let finest = plan.at_finest();
+                let sky = scene.light.sky.is_none() || finest.sky;
+                let AtFinest {
+                    exchange,
+                    direct,
+                    elements,
+                    soil,
+                    ..
+                } = finest;
+                [exchange, direct, sky, elements, soil]
+            },
             cost_s: work_s(&WorkCounts::of(&lit, &plan)),
         };
         let left_s = settings.budget_s.map(|s| s - begun.elapsed().as_secs_f64());
@@ -216,16 +227,7 @@ pub fn solve_in_rounds(
         } else {
             following(&measured, asked, left_s.map(|left_s| (took_s, left_s)))
         };
-        let next = next.and_then(|aims| {
-            let sources = if aims.sky_percent < plan.aims.sky_percent {
-                sources_for(scene, &aims, settings)
-            } else {
-                sources.clone()
-            };
-            let plan = Plan::aimed(&lit_canopy(scene, &sources), settings, &aims);
-            plan.map(|plan| (sources, plan))
-                .map_err(|_| Ended::BeyondLimits)
-        });
+        let next = next.and_then(|aims| within_limits(scene, settings, (&sources, &plan), &aims));
         let solved = Solved {
             accuracy: Accuracy {
                 asked_percent: asked,
@@ -289,6 +291,51 @@ fn lit_canopy<'a>(scene: &'a Scene, sources: &'a Sources) -> LitCanopy<'a> {
         optics: &scene.optics,
         sources,
     }
+}
+
+/// The next round, as finely as the limits allow: what memory stands against must not keep it from helping the rest.
+fn within_limits(
+    scene: &Scene,
+    settings: &Settings,
+    (sources, last): (&Sources, &Plan),
+    finer: &Aims,
+) -> Result<(Sources, Plan), Ended> {
+    for part in OF_THE_WAY {
+        let aims = last.aims.towards(finer, part);
+        if part < 1.0 && !is_worth_a_round(&last.aims, &aims) {
+            break;
+        }
+        let sources = if aims.sky_percent < last.aims.sky_percent {
+            sources_for(scene, &aims, settings)
+        } else {
+            sources.clone()
+        };
+        match Plan::aimed(&lit_canopy(scene, &sources), settings, &aims) {
+            Ok(plan) => return Ok((sources, plan)),
+            Err(PlanError::Memory { .. } | PlanError::Elements { .. }) => {}
+            Err(_) => break,
+        }
+    }
+    Err(Ended::BeyondLimits)
+}
+
+/// Parts of the way to finer aims that are tried, of what takes memory.
+const OF_THE_WAY: [f64; 3] = [1.0, 0.5, 0.0];
+
+/// Whether any part of what is left of a plan would be finer by enough to be worth a round.
+fn is_worth_a_round(last: &Aims, next: &Aims) -> bool {
+    const ENOUGH: f64 = 0.9;
+    let parts = |aims: &Aims| {
+        [
+            aims.exchange_percent,
+            aims.direct_percent,
+            aims.sky_percent,
+            aims.elements_percent,
+            aims.soil_percent,
+        ]
+    };
+    let pairs = parts(next).into_iter().zip(parts(last));
+    pairs.into_iter().any(|(next, last)| next < ENOUGH * last)
 }
 
 /// What to plan the next round for; where time is limited, with what the last one took and what is left.

@@ -17,8 +17,8 @@ pub(super) struct Measured<'a> {
     pub(super) coarsest_exchange_percent: f64,
     /// What came of it, by band.
     pub(super) errors: &'a [BandAccount],
-    /// Whether there are no more directions of the sky to be had.
-    pub(super) sky_is_fixed: bool,
+    /// Which parts no plan makes finer.
+    pub(super) fixed: [bool; PARTS],
     /// What each part took, roughly, s.
     pub(super) cost_s: PerPart,
 }
@@ -27,19 +27,21 @@ pub(super) struct Measured<'a> {
 const AIM: f64 = 0.85;
 
 /// No part is planned finer than the last time by more than this: the cost grows with its square. Elements that are
-/// uncut triangles tell less of smaller ones.
-const MOST_FINER: PerPart = [10.0, 10.0, 10.0, 3.5];
+/// uncut triangles tell less of smaller ones, and so do soil cells.
+const MOST_FINER: PerPart = [10.0, 10.0, 10.0, 3.5, 3.5];
 
-/// Where what cannot be planned for leaves less than this of the square, the rest would have to be far finer than
-/// is asked for, and the whole hardly better.
+/// The square of what can be planned for is not brought below this part of the square of what cannot, or of what is
+/// aimed at where that is more: it would have to be far finer, and the whole hardly better. And not below what is
+/// aimed at, which is all that was asked of it.
 const LEAST_LEFT: f64 = 0.3;
 
 impl Measured<'_> {
-    /// By how much each part has to err less; none where no plan helps, because what cannot be planned for is too
-    /// much alone.
+    /// By how much each part has to err less; none where no plan helps, because what cannot be planned for is nearly
+    /// all that is left.
     pub(super) fn finer(&self, asked_percent: f64) -> Option<PerPart> {
         // the solver is as much finer as the exchange
-        let without_solver = self.finer_with(asked_percent, 0.0)?;
+        let without_solver = self.finer_with(asked_percent, 0.0);
+        let without_solver = without_solver.unwrap_or([1.0; PARTS]);
         let solver = self.aims(&without_solver).exchange_percent / self.aims.exchange_percent;
         self.finer_with(asked_percent, solver)
     }
@@ -48,16 +50,27 @@ impl Measured<'_> {
     fn finer_with(&self, asked_percent: f64, solver: f64) -> Option<PerPart> {
         let aimed = AIM * asked_percent;
         let mut bands = Vec::new();
+        let mut misses = false;
         for band in self.errors {
             let parts = self.parts(band).map(|e| e * e);
-            let left = (aimed - solver * band.solver_percent).max(0.0).powi(2);
-            let left = left - self.fixed_square(band);
-            if parts.iter().sum::<f64>() > left && left <= LEAST_LEFT * aimed * aimed {
-                return None;
-            }
+            let (sum, fixed) = (parts.iter().sum::<f64>(), self.fixed_square(band));
+            let reachable = (aimed - solver * band.solver_percent).max(0.0).powi(2) - fixed;
+            let least = (LEAST_LEFT * fixed.max(aimed * aimed)).min(aimed * aimed);
+            let left = if reachable >= least {
+                reachable
+            } else if sum <= least / (AIM * AIM) {
+                // as good as it gets
+                sum
+            } else {
+                least
+            };
+            misses |= sum > left;
             if left > 0.0 {
                 bands.push(parts.map(|square| square / left));
             }
+        }
+        if !misses {
+            return None;
         }
         let factors = allot(&bands, &self.cost_s);
         Some(std::array::from_fn(|k| factors[k].max(1.0 / MOST_FINER[k])))
@@ -65,26 +78,15 @@ impl Measured<'_> {
 
     /// The parts that can be planned for.
     fn parts(&self, parts: &BandAccount) -> PerPart {
-        [
-            parts.exchange_percent,
-            parts.direct_percent,
-            if self.sky_is_fixed {
-                0.0
-            } else {
-                parts.sky_percent
-            },
-            parts.elements_percent,
-        ]
+        let all = all_parts(parts);
+        std::array::from_fn(|k| if self.fixed[k] { 0.0 } else { all[k] })
     }
 
     /// The square of what cannot.
     fn fixed_square(&self, parts: &BandAccount) -> f64 {
-        let sky = if self.sky_is_fixed {
-            parts.sky_percent
-        } else {
-            0.0
-        };
-        sky * sky + parts.far_field_percent * parts.far_field_percent
+        let fixed = all_parts(parts).into_iter().zip(self.fixed);
+        let of_parts = fixed.filter(|(_, fixed)| *fixed).map(|(e, _)| e * e);
+        of_parts.sum::<f64>() + parts.far_field_percent * parts.far_field_percent
     }
 
     /// The same where only so much time is left, when the last round took `took_s`; none where what fits would
@@ -125,8 +127,21 @@ impl Measured<'_> {
             direct_percent: last.direct_percent * finer[1],
             sky_percent: last.sky_percent * finer[2],
             elements_percent: last.elements_percent * finer[3],
+            soil_percent: last.soil_percent * finer[4],
         }
+        .not_below_the_least()
     }
+}
+
+/// The parts that plans are made for, whether or not there are finer ones.
+fn all_parts(parts: &BandAccount) -> PerPart {
+    [
+        parts.exchange_percent,
+        parts.direct_percent,
+        parts.sky_percent,
+        parts.elements_percent,
+        parts.soil_percent,
+    ]
 }
 
 /// A round that goes less than this part of the way is not worth its time.
@@ -179,12 +194,14 @@ mod tests {
             direct_percent,
             sky_percent,
             elements_percent,
+            soil_percent,
         ] = percent;
         BandAccount {
             exchange_percent,
             direct_percent,
             sky_percent,
             elements_percent,
+            soil_percent,
             ..BandAccount::default()
         }
     }
@@ -194,14 +211,17 @@ mod tests {
             aims: Aims::of(0.5),
             coarsest_exchange_percent: 0.7,
             errors,
-            sky_is_fixed: false,
-            cost_s: [1.0, 0.5, 0.0, 0.5],
+            fixed: [false; PARTS],
+            cost_s: [1.0, 0.5, 0.0, 0.5, 0.5],
         }
     }
 
     #[test]
     fn all_bands_are_brought_down_to_what_is_asked_for() {
-        let errors = [parts([0.2, 0.9, 0.0, 0.1]), parts([0.8, 0.1, 0.0, 0.9])];
+        let errors = [
+            parts([0.2, 0.9, 0.0, 0.1, 0.3]),
+            parts([0.8, 0.1, 0.0, 0.9, 0.1]),
+        ];
         let finer = measured(&errors).finer(0.5).unwrap();
         for band in &errors {
             let parts = measured(&errors).parts(band);
@@ -217,7 +237,7 @@ mod tests {
 
     #[test]
     fn a_part_alone_has_all_of_the_error() {
-        let errors = [parts([0.9, 0.0, 0.0, 0.0])];
+        let errors = [parts([0.9, 0.0, 0.0, 0.0, 0.0])];
         let finer = measured(&errors).finer(0.5).unwrap();
         assert!((finer[0] - AIM * 0.5 / 0.9).abs() < 1e-9, "{finer:?}");
     }
@@ -227,7 +247,7 @@ mod tests {
     fn what_a_look_leaves_to_the_solver_is_not_left_by_the_next_round() {
         let look = BandAccount {
             solver_percent: 0.07,
-            ..parts([2.0, 0.0, 0.0, 0.0])
+            ..parts([2.0, 0.0, 0.0, 0.0, 0.0])
         };
         let finer = measured(&[look]).finer(0.5).unwrap();
         let left = AIM * 0.5 - 0.07 * finer[0];
@@ -238,27 +258,60 @@ mod tests {
     fn what_cannot_be_planned_for_ends_it() {
         let far = BandAccount {
             far_field_percent: 3.0,
-            ..parts([0.1; 4])
+            ..parts([0.1; PARTS])
         };
         assert_eq!(measured(&[far]).finer(0.5), None);
+    }
+
+    /// Trees over a crop within a sphere, 0.5 % asked: direct light was 3.06 of 3.11 %, and there was no second round,
+    /// because the far field alone was more than 0.36 %.
+    #[test]
+    fn what_a_plan_cannot_help_does_not_keep_it_from_helping_the_rest() {
+        for far_field_percent in [0.3, 0.4, 0.5, 1.0, 3.0] {
+            let errors = [BandAccount {
+                far_field_percent,
+                ..parts([0.3, 3.06, 0.0, 0.1, 0.1])
+            }];
+            let finer = measured(&errors).finer(0.5).unwrap();
+            let rest = |finer: &PerPart| -> f64 {
+                let parts = measured(&errors).parts(&errors[0]);
+                parts.iter().zip(finer).map(|(e, f)| (e * f).powi(2)).sum()
+            };
+            let fixed = far_field_percent * far_field_percent;
+            let total = (rest(&finer) + fixed).sqrt();
+            // hardly more than it cannot help, and no finer than that needs
+            assert!(
+                total < (1.15 * far_field_percent).max(0.5),
+                "{total} {finer:?}"
+            );
+            assert!(rest(&finer) > 0.29 * (AIM * 0.5).powi(2), "{finer:?}");
+            // and that is the end of it
+            let all = measured(&errors).parts(&errors[0]);
+            let next = [BandAccount {
+                far_field_percent,
+                ..parts(std::array::from_fn(|k| all[k] * finer[k] * 1.1))
+            }];
+            let reached = next[0].total_percent() <= 0.5;
+            assert!(reached || measured(&next).finer(0.5).is_none());
+        }
     }
 
     #[test]
     fn a_band_that_nothing_helps_is_not_passed_over_for_one_that_is_noisier() {
         let far = BandAccount {
             far_field_percent: 2.3,
-            ..parts([0.1; 4])
+            ..parts([0.1; PARTS])
         };
-        assert_eq!(measured(&[parts([0.6; 4]), far]).finer(2.0), None);
+        assert_eq!(measured(&[parts([0.6; PARTS]), far]).finer(2.0), None);
     }
 
     #[test]
     fn a_sky_that_has_no_more_directions_is_not_chased() {
-        let errors = [parts([0.9, 0.0, 0.5, 0.0])];
+        let errors = [parts([0.9, 0.0, 0.5, 0.0, 0.0])];
         let mut measured = measured(&errors);
         assert!(measured.finer(0.5).is_some_and(|finer| finer[2] < 1.0));
-        measured.sky_is_fixed = true;
-        assert_eq!(measured.finer(0.5), None);
+        measured.fixed[2] = true;
+        assert!(measured.finer(0.5).is_some_and(|finer| finer[2] == 1.0));
         // what it leaves is for the others
         let finer = measured.finer(1.0).unwrap();
         assert!(finer[0] < 1.0 && finer[2] == 1.0, "{finer:?}");
@@ -266,12 +319,12 @@ mod tests {
 
     #[test]
     fn no_other_split_of_the_error_costs_less() {
-        let (errors, cost) = ([0.8, 0.6, 0.0, 0.9], [1.0, 0.5, 0.0, 0.3]);
+        let (errors, cost) = ([0.8, 0.6, 0.0, 0.9, 0.2], [1.0, 0.5, 0.0, 0.3, 0.4]);
         let of = |f: &PerPart| (0..PARTS).map(|k| cost[k] / (f[k] * f[k])).sum::<f64>();
         let best = allot(&[errors.map(|e: f64| e * e / 0.2)], &cost);
         let all: f64 = (0..PARTS).map(|k| (best[k] * errors[k]).powi(2)).sum();
         assert!((all / 0.2 - 1.0).abs() < 1e-9, "{all}");
-        for (a, b) in [(0, 1), (0, 3), (1, 3)] {
+        for (a, b) in [(0, 1), (0, 3), (1, 3), (3, 4)] {
             for step in [-0.01, 0.01] {
                 let mut other = best;
                 let square = |f: f64, k: usize| (f * errors[k]).powi(2);
@@ -287,9 +340,9 @@ mod tests {
     /// 15 times finer by the time that NIR had had its turn, where 6 times are enough.
     #[test]
     fn a_part_that_one_band_needs_is_no_finer_for_the_sake_of_another() {
-        let bands = [[0.284, 2.0, 0.0, 0.3], [0.596, 0.6, 0.0, 1.0]];
+        let bands = [[0.284, 2.0, 0.0, 0.3, 0.0], [0.596, 0.6, 0.0, 1.0, 0.0]];
         let squares = bands.map(|band| band.map(|e: f64| (e / 0.45).powi(2)));
-        let factors = allot(&squares, &[1.45, 0.02, 0.0, 0.8]);
+        let factors = allot(&squares, &[1.45, 0.02, 0.0, 0.8, 0.0]);
         for band in squares {
             let sum: f64 = (0..PARTS).map(|k| band[k] * factors[k].powi(2)).sum();
             assert!(sum < 1.000_001, "{sum} {factors:?}");
@@ -299,9 +352,9 @@ mod tests {
 
     #[test]
     fn a_round_that_fits_no_more_is_made_coarser_or_left_out() {
-        let errors = [parts([1.0, 0.5, 0.0, 0.5])];
+        let errors = [parts([1.0, 0.5, 0.0, 0.5, 0.0])];
         let measured = measured(&errors);
-        let finer = [0.25, 0.5, 1.0, 0.5];
+        let finer = [0.25, 0.5, 1.0, 0.5, 1.0];
         assert_eq!(measured.within(finer, 1.0, 100.0), Some(finer));
         let fits = measured.within(finer, 1.0, 4.0).unwrap();
         assert!(fits[0] > finer[0] && fits[0] < 1.0, "{fits:?}");

@@ -1,11 +1,12 @@
 //! What a round takes, part by part.
 
-use nestrad_kernel::cost::{DRAWN_NS, ELEMENT_NS, MET_NS, Z_DRAWN_NS, Z_POINT_NS};
+use nestrad_kernel::cost::{DRAWN_NS, ELEMENT_NS, MET_NS, SOIL_CELL_NS, Z_DRAWN_NS, Z_POINT_NS};
 
 use crate::plan::WorkCounts;
 
-/// Parts that can be planned for: exchange, direct light, directions of a sky, elements.
-pub(super) const PARTS: usize = 4;
+/// Parts that can be planned for: exchange, direct light, directions of a sky, elements, soil
+/// cells.
+pub(super) const PARTS: usize = 5;
 
 /// A number for each of them.
 pub(super) type PerPart = [f64; PARTS];
@@ -23,6 +24,7 @@ pub(super) fn work_s(counts: &WorkCounts) -> PerPart {
         counts.direct_lines * Z_POINT_NS,
         sky,
         counts.elements * ELEMENT_NS,
+        counts.soil_cells * SOIL_CELL_NS,
     ]
     .map(|ns| 1e-9 * ns)
 }

@@ -7,8 +7,8 @@
 //! free of the noise of either: squares are taken so.
 
 use super::gather::{Gather, Half};
-use super::groups::Groups;
 use super::pass::Pass;
+use super::soil_groups::Member;
 use super::system::{Deviation, FarSample, Sampled, System};
 
 /// Passes that a change is followed for.
@@ -25,16 +25,47 @@ impl<const N: usize> Pass<'_, N> {
         if groups.wider <= 1.0 {
             return vec![Deviation::default(); self.bands.len()];
         }
+        let (frame, outlook) = (self.gather.frame, self.gather.outlook);
+        let faces = (0..).zip(&groups.of_face).map(|(end, &group)| Member {
+            end,
+            group,
+            area_m2: frame.row_area_m2(end as usize) * outlook.exposed[end as usize],
+        });
+        self.followed(self.put_together(faces, groups.len, 1.0 / (groups.wider - 1.0)))
+    }
+
+    /// What the size of soil cells does, and of the zones around them: by cells that are put together by four, in
+    /// either way (see [`SoilGroups`](super::soil_groups::SoilGroups)). It is not followed any farther: what soil
+    /// cells have too much and too little lies side by side.
+    pub(super) fn of_soil_cells(&self) -> [Vec<Deviation>; 2] {
+        let soil = &self.system.groups.soil;
+        let is_dark = |&band: &usize| self.system.optics.bands[band].soil_albedo == 0.0;
+        if soil.len == 0 || self.bands.iter().all(is_dark) {
+            return [(); 2].map(|()| vec![Deviation::default(); self.bands.len()]);
+        }
+        soil.ways.each_ref().map(|way| {
+            let [x, y] = self.put_together(way.iter().copied(), soil.len, 1.0);
+            self.summed_up([&x, &y])
+        })
+    }
+
+    /// How the irradiances of rows change when the radiosities of the members of each group are one, times `factor`.
+    fn put_together(
+        &self,
+        members: impl Iterator<Item = Member> + Clone,
+        groups: usize,
+        factor: f64,
+    ) -> [Vec<[f64; N]>; 2] {
         let [a, b] = &self.system.exchange.halves;
         let dark = vec![[0.0; N]; self.x.irradiance.len()];
         let [x, y] = [&self.x, &self.y].map(|half| Half {
             irradiance: dark.clone(),
-            radiosity: self.grouped(groups, half, 1.0 / (groups.wider - 1.0)),
+            radiosity: grouped(members.clone(), groups, half, factor),
         });
         let mut first = [x.clone(), x.clone()];
         self.gather.half_pass(0, a, &y, None, &mut first[0]);
         self.gather.half_pass(1, b, &x, None, &mut first[1]);
-        self.followed(first.map(|half| half.irradiance))
+        first.map(|half| half.irradiance)
     }
 
     /// What a field of means beyond the sphere does.
@@ -64,29 +95,6 @@ impl<const N: usize> Pass<'_, N> {
         self.followed(change)
     }
 
-    /// How the radiosities of rows change when those of a group are one, times `factor`; other ends stay.
-    fn grouped(&self, groups: &Groups, half: &Half<[f64; N]>, factor: f64) -> Vec<[f64; N]> {
-        let frame = self.gather.frame;
-        let area_m2 = |row: usize| frame.row_area_m2(row) * self.gather.outlook.exposed[row];
-        let mut sums = vec![([0.0; N], 0.0); groups.len];
-        for (row, &group) in groups.of_row.iter().enumerate() {
-            let ((sum, area), own) = (&mut sums[group as usize], area_m2(row));
-            for (sum, b) in sum.iter_mut().zip(half.radiosity[row]) {
-                *sum += own * b;
-            }
-            *area += own;
-        }
-        let mut change = vec![[0.0; N]; half.radiosity.len()];
-        for (row, &group) in groups.of_row.iter().enumerate() {
-            let (sum, area) = &sums[group as usize];
-            if *area > 0.0 && area_m2(row) > 0.0 {
-                let own = &half.radiosity[row];
-                change[row] = std::array::from_fn(|k| factor * (sum[k] / area - own[k]));
-            }
-        }
-        change
-    }
-
     /// Follows a change of what rows gather, and sums it up by organs.
     fn followed(&self, first: [Vec<[f64; N]>; 2]) -> Vec<Deviation> {
         let frame = self.gather.frame;
@@ -107,14 +115,45 @@ impl<const N: usize> Pass<'_, N> {
             self.gather
                 .half_pass(1, &halves[1], &x, Some(&first[1]), &mut y);
         }
+        self.summed_up([&x.irradiance, &y.irradiance])
+    }
+
+    /// A change of irradiances of rows, summed up by organs.
+    fn summed_up(&self, halves: [&[[f64; N]]; 2]) -> Vec<Deviation> {
         let bands = self.bands.iter().enumerate();
         bands
             .map(|(k, &band)| Deviation {
-                halves_W: [&x, &y]
-                    .map(|half| by_organ(&self.system, band, |row| half.irradiance[row][k])),
+                halves_W: halves.map(|half| by_organ(&self.system, band, |row| half[row][k])),
             })
             .collect()
     }
+}
+
+/// How the radiosities of members change when those of a group are one, times `factor`; other ends stay.
+fn grouped<const N: usize>(
+    members: impl Iterator<Item = Member> + Clone,
+    groups: usize,
+    half: &Half<[f64; N]>,
+    factor: f64,
+) -> Vec<[f64; N]> {
+    let mut sums = vec![([0.0; N], 0.0); groups];
+    for member in members.clone() {
+        let (sum, area) = &mut sums[member.group as usize];
+        for (sum, b) in sum.iter_mut().zip(half.radiosity[member.end as usize]) {
+            *sum += member.area_m2 * b;
+        }
+        *area += member.area_m2;
+    }
+    let mut change = vec![[0.0; N]; half.radiosity.len()];
+    for member in members {
+        let (sum, area) = &sums[member.group as usize];
+        if *area > 0.0 && member.area_m2 > 0.0 {
+            let own = &half.radiosity[member.end as usize];
+            change[member.end as usize] =
+                std::array::from_fn(|k| factor * (sum[k] / area - own[k]));
+        }
+    }
+    change
 }
 
 /// Power that irradiances make organs absorb, W.

@@ -215,7 +215,8 @@ impl<'a, const N: usize> Gather<'a, N> {
     /// The radiosities of the far ends as they follow from those of the faces.
     pub(super) fn close_far_field<L: Lane<N>>(&self, half: usize, radiosity: &mut [L]) {
         let Some(far) = self.far else { return };
-        let (near, far_ends) = radiosity.split_at_mut(self.frame.ends.far(0) as usize);
+        let (near, others) = radiosity.split_at_mut(self.frame.ends.far(0) as usize);
+        let far_ends = &mut others[..self.frame.ends.far_ends as usize];
         let rows = &far.halves[half];
         far_ends.par_iter_mut().enumerate().for_each(|(row, out)| {
             let lines = rows.row(row).len();

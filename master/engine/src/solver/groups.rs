@@ -5,18 +5,21 @@ use nestrad_common::geometry;
 use nestrad_kernel::elements::piece_corners;
 use rayon::prelude::*;
 
+use super::soil_groups::SoilGroups;
 use crate::frame::Frame;
 
 /// Which rows share one radiosity when elements are about twice as wide.
 #[derive(Clone, Debug)]
 pub struct Groups {
-    /// The group of each row.
-    pub(super) of_row: Vec<u32>,
+    /// The group of each face.
+    pub(super) of_face: Vec<u32>,
     /// How many groups there are.
     pub(super) len: usize,
     /// How much wider groups are than elements: the root of how many elements of equal size a group holds, on
     /// average over the area.
     pub(super) wider: f64,
+    /// Those of the soil.
+    pub(super) soil: SoilGroups,
 }
 
 /// A group is cut in two while it holds more than this many elements, small ones counting for little.
@@ -32,7 +35,7 @@ struct Piece {
 }
 
 impl Groups {
-    /// Groups the elements of each organ, faces of one side together, and cells of the soil by four.
+    /// Groups the elements of each organ, faces of one side together, and the soil.
     ///
     /// The triangles of an organ have to lie one after the other, as the frame has them.
     pub fn of(frame: &Frame) -> Self {
@@ -41,29 +44,22 @@ impl Groups {
             .map(|elements| OfOrgan::of(frame, elements))
             .collect();
         let mut groups = Self {
-            of_row: Vec::with_capacity(frame.rows()),
+            of_face: Vec::with_capacity(frame.ends.faces() as usize),
             len: 0,
             wider: 1.0,
+            soil: SoilGroups::of(frame),
         };
         let (mut area_m2, mut pieces_m2) = (0.0, 0.0);
         for organ in &of_organs {
             let first = groups.len as u32;
             for group in &organ.of_element {
                 groups
-                    .of_row
+                    .of_face
                     .extend([first + 2 * group, first + 2 * group + 1]);
             }
             groups.len += 2 * organ.groups;
             area_m2 += organ.area_m2;
             pieces_m2 += organ.pieces_m2;
-        }
-        if let Some(soil) = &frame.world.soil {
-            let first = groups.len as u32;
-            let [nx, ny] = soil.cells;
-            let wide = nx.div_ceil(2);
-            let group = |cell: u32| first + (cell / nx / 2) * wide + cell % nx / 2;
-            groups.of_row.extend((0..soil.len()).map(group));
-            groups.len += (wide * ny.div_ceil(2)) as usize;
         }
         if area_m2 > 0.0 {
             groups.wider = (pieces_m2 / area_m2).sqrt();

@@ -21,6 +21,7 @@ mod krylov;
 mod lane;
 mod pass;
 mod prefetch;
+mod soil_groups;
 mod solve;
 mod spread;
 mod sums;

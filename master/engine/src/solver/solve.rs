@@ -60,6 +60,7 @@ pub fn solve(
         left: vec![0.0; bands.len()],
         variances: vec![Variances::default(); bands.len()],
         of_element_size: Vec::new(),
+        of_soil_cells: Default::default(),
         of_far_field: Vec::new(),
     };
     let mut done = 0;
@@ -111,6 +112,9 @@ impl Group<'_> {
         all.passes = all.passes.max(pass.done);
         self.take(&pass, first, all);
         all.of_element_size.extend(pass.of_element_size());
+        for (all, way) in all.of_soil_cells.iter_mut().zip(pass.of_soil_cells()) {
+            all.extend(way);
+        }
         if let Some(sample) = &self.system.far_sample {
             all.of_far_field.extend(pass.of_far_field(sample));
         }

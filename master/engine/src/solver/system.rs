@@ -68,6 +68,8 @@ pub struct Irradiance {
     pub variances: Vec<Variances>,
     /// What the size of elements may do, per band.
     pub of_element_size: Vec<Deviation>,
+    /// What the size of soil cells may do, by cells put together in either of two ways, per band.
+    pub of_soil_cells: [Vec<Deviation>; 2],
     /// What the mean field beyond the sphere does, per band, where there is one.
     pub of_far_field: Vec<Deviation>,
 }

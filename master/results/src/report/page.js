@@ -147,7 +147,7 @@ function showErrors() {
 // what is nothing in all bands is not worth a column
 function errorParts() {
   const parts = [['exchange', 'exchange_percent'], ['direct light', 'direct_percent'], ['directions of the sky', 'sky_percent'],
-    ['size of elements', 'elements_percent'], ['far field', 'far_field_percent'], ['solver', 'solver_percent']];
+    ['size of elements', 'elements_percent'], ['size of soil cells', 'soil_percent'], ['far field', 'far_field_percent'], ['solver', 'solver_percent']];
   const shown = parts.filter(([, key]) => report.account.some((part) => part[key] >= 0.005));
   if (shown.length === 0) return '';
   return table(['what it comes from, %', ...shown.map(([name]) => name)],

@@ -13,6 +13,7 @@ use crate::above::Above;
 use crate::elements::{Elements, MAX_DIVISIONS};
 use crate::ends::Ends;
 use crate::far_grid::SharedFarGrid;
+use crate::ground::Ground;
 use crate::lattice::{Extent, Soup};
 use crate::soil::SoilGrid;
 use crate::world::World;
@@ -68,6 +69,8 @@ pub struct Block {
     /// Numbering of the whole scene.
     pub(crate) ends: Ends,
     pub(crate) soil: Option<SoilGrid>,
+    /// The same with what lies around it.
+    pub(crate) ground: Option<Ground>,
     pub(crate) radius_m: f64,
     pub(crate) far: Option<SharedFarGrid>,
     pub(crate) soup: Arc<Soup>,
@@ -118,6 +121,7 @@ impl Block {
             extent: *extent,
             ends,
             soil: *soil,
+            ground: Ground::of(&frame.world),
             radius_m: *radius_m,
             far: far.clone(),
             soup,

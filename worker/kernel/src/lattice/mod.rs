@@ -12,6 +12,8 @@ mod strips;
 
 use glam::{DVec2, DVec3};
 
+use crate::touch::touch_m;
+
 pub use scan::{Fragment, Projected};
 pub use soup::Soup;
 pub use strips::Strips;
@@ -69,6 +71,8 @@ pub struct Lattice {
     offset: DVec2,
     s_min_m: f64,
     s_steps_per_m: f64,
+    /// What lies closer together touches, metres.
+    pub(crate) touch_m: f64,
 }
 
 /// The sides of a lattice of `lines` points, of which one is near `wanted_y`.
@@ -154,6 +158,7 @@ impl Lattice {
             offset: DVec2::new(random[0], random[1]) - (lo - shear * extent.min_m.z) * steps_per_m,
             s_min_m: extent.min_m.z / d.z,
             s_steps_per_m: S_STEPS / s_range,
+            touch_m: touch_m(extent),
         }
     }
 
@@ -176,6 +181,40 @@ impl Lattice {
         )
     }
 
+    /// The places, in lattice coordinates, where a line may meet a triangle: one for each copy of the triangle.
+    pub(crate) fn places_of(
+        &self,
+        line: usize,
+        triangle: &[DVec3; 3],
+    ) -> impl Iterator<Item = DVec2> + use<> {
+        let corners = triangle.map(|p| self.place(p));
+        let lo = corners[0].min(corners[1]).min(corners[2]);
+        let hi = corners[0].max(corners[1]).max(corners[2]);
+        let nx = self.nx as usize;
+        let at = DVec2::new((line % nx) as f64, (line / nx) as f64);
+        let copies = |at: f64, n: u32, lo: f64, hi: f64| {
+            if !self.periodic {
+                return 0..=0;
+            }
+            let n = f64::from(n);
+            // a vertex is rounded on its way to the lattice
+            let (first, last) = (
+                ((lo - at) / n - 1e-3).ceil(),
+                ((hi - at) / n + 1e-3).floor(),
+            );
+            first as i64..=last as i64
+        };
+        let (across, along) = (
+            copies(at.x, self.nx, lo.x, hi.x),
+            copies(at.y, self.ny, lo.y, hi.y),
+        );
+        let size = DVec2::new(f64::from(self.nx), f64::from(self.ny));
+        along.flat_map(move |l| {
+            let k = across.clone();
+            k.map(move |k| at + DVec2::new(k as f64, l as f64) * size)
+        })
+    }
+
     #[inline]
     fn u(&self, x: f64, z: f64) -> f64 {
         snap((x - z * self.shear.x) * self.steps_per_m.x + self.offset.x)
@@ -192,7 +231,8 @@ impl Lattice {
     }
 
     /// Distance along the line as a whole number that sorts like it; see [`Self::distance_m`].
-    fn depth(&self, s_m: f64) -> u32 {
+    #[inline]
+    pub(crate) fn depth(&self, s_m: f64) -> u32 {
         // a float-to-integer cast saturates: what lies outside the extent sorts to its ends
         ((s_m - self.s_min_m) * self.s_steps_per_m) as u32
     }

@@ -27,6 +27,8 @@ pub struct Fragment {
 pub struct Projected {
     /// By rising v, then u.
     corner: [[f64; 3]; 3],
+    /// The same before rounding.
+    exact: [[f64; 2]; 3],
     /// Which vertex each corner was.
     vertex: [usize; 3],
     /// The upper face looks along the direction of the lines.
@@ -67,6 +69,7 @@ impl Projected {
         let turn = (u[1] - u[0]) * (v[2] - v[0]) - (u[2] - u[0]) * (v[1] - v[0]);
         Some(Self {
             corner: vertex.map(|k| [u[k], v[k], lattice.s_m(triangle[k])]),
+            exact: vertex.map(|k| lattice.place(triangle[k]).to_array()),
             vertex,
             upper_along: turn > 0.0,
             first_row,
@@ -108,8 +111,7 @@ impl Projected {
                 if first >= end {
                     continue;
                 }
-                let Some(plane) = plane.get_or_insert_with(|| Plane::new(self.corner)).valid()
-                else {
+                let Some(plane) = plane.get_or_insert_with(|| Plane::new(self)).valid() else {
                     return;
                 };
                 let row_start = row as usize * lattice.nx as usize;
@@ -120,7 +122,7 @@ impl Projected {
                     let (du, dv) = (i as f64 - a[0], j as f64 - a[1]);
                     hit(Fragment {
                         line: row_start + column as usize,
-                        depth: lattice.depth(plane.s_m(du, dv)),
+                        depth: lattice.depth(plane.s_m([i as f64, j as f64])),
                         place: if with_place {
                             plane.place(du, dv, self.vertex)
                         } else {
@@ -178,29 +180,42 @@ impl Edge {
 
 /// Depth and barycentric coordinates over the lattice, from the first corner on.
 struct Plane {
-    ab: [f64; 3],
-    ac: [f64; 3],
+    ab: [f64; 2],
+    ac: [f64; 2],
     inverse: f64,
+    /// Of the first corner, before rounding.
+    start: [f64; 2],
     s_m: f64,
     slope: [f64; 2],
     s_range_m: [f64; 2],
 }
 
 impl Plane {
-    fn new([a, b, c]: [[f64; 3]; 3]) -> Self {
-        let minus = |p: [f64; 3]| [p[0] - a[0], p[1] - a[1], p[2] - a[2]];
-        let (ab, ac) = (minus(b), minus(c));
-        let inverse = 1.0 / (ab[0] * ac[1] - ac[0] * ab[1]);
+    fn new(projected: &Projected) -> Self {
+        let [a, b, c] = projected.corner;
+        let from = |p: [f64; 2], q: [f64; 2]| [q[0] - p[0], q[1] - p[1]];
+        let (ab, ac) = (
+            from([a[0], a[1]], [b[0], b[1]]),
+            from([a[0], a[1]], [c[0], c[1]]),
+        );
+        let area = ab[0] * ac[1] - ac[0] * ab[1];
+        // rounded corners say which lines meet the triangle; where they meet it, the corners as they are: rounding
+        // would carry a steep face through one behind it
+        let [start, p, q] = projected.exact;
+        let (p, q) = (from(start, p), from(start, q));
+        let rise = [b[2] - a[2], c[2] - a[2]];
+        let inverse = 1.0 / (p[0] * q[1] - q[0] * p[1]);
         Self {
-            inverse,
-            s_m: a[2],
-            slope: [
-                (ab[2] * ac[1] - ac[2] * ab[1]) * inverse,
-                (ac[2] * ab[0] - ab[2] * ac[0]) * inverse,
-            ],
-            s_range_m: [a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2])],
             ab,
             ac,
+            inverse: 1.0 / area,
+            start,
+            s_m: a[2],
+            slope: [
+                (rise[0] * q[1] - rise[1] * p[1]) * inverse,
+                (rise[1] * p[0] - rise[0] * q[0]) * inverse,
+            ],
+            s_range_m: [a[2].min(b[2]).min(c[2]), a[2].max(b[2]).max(c[2])],
         }
     }
 
@@ -210,10 +225,16 @@ impl Plane {
     }
 
     #[inline]
-    fn s_m(&self, du: f64, dv: f64) -> f64 {
+    fn s_m(&self, [u, v]: [f64; 2]) -> f64 {
+        let (du, dv) = (u - self.start[0], v - self.start[1]);
+        let s_m = self.s_m + du * self.slope[0] + dv * self.slope[1];
         // a triangle that is nearly edge-on is steep: rounding must not carry a hit past its vertices
-        (self.s_m + du * self.slope[0] + dv * self.slope[1])
-            .clamp(self.s_range_m[0], self.s_range_m[1])
+        let [least, greatest] = self.s_range_m;
+        if s_m > least {
+            s_m.min(greatest)
+        } else {
+            least
+        }
     }
 
     /// Barycentric coordinates of the second and third vertex, in the user's order.

@@ -9,6 +9,7 @@ use crate::block::Block;
 use crate::elements;
 use crate::lattice::{Lattice, Projected, Strips};
 use crate::part::Part;
+use crate::touch::{CLOSE, Stacks};
 
 /// Where a line meets the block: depth along the line, local element, and which face it meets.
 ///
@@ -25,6 +26,15 @@ impl Hit {
     /// In steps of the lattice's depth.
     pub(crate) fn depth(self) -> u32 {
         (self.0 >> 32) as u32
+    }
+
+    fn local_element(self) -> u32 {
+        self.face_against() >> 1
+    }
+
+    /// The same face, at another depth.
+    fn at_depth(self, depth: u32) -> Self {
+        Self(u64::from(depth) << 32 | u64::from(self.face_against()))
     }
 
     /// The local face that looks along the direction of the lines.
@@ -85,7 +95,8 @@ fn draw_together(
     });
     for (k, strip) in strips.iter_mut().enumerate() {
         strip.sort();
-        strip.for_each_line(&mut |number, hits| line(k, number, hits));
+        let stacks = Stacks::new(&lattices[k], &block.soup, &block.elements);
+        strip.for_each_line(&stacks, &mut |number, hits| line(k, number, hits));
     }
     lattices.iter().map(|l| l.lines() as u64).collect()
 }
@@ -97,6 +108,7 @@ fn for_each_line_of_part(
     mut line: impl FnMut(usize, &[Hit]),
 ) -> u64 {
     let strips = Strips::new(lattice, &block.soup, LINES_IN_STRIP);
+    let stacks = Stacks::new(lattice, &block.soup, &block.elements);
     let mut strip = Strip::default();
     let mut lines = 0;
     for s in part.of(strips.len() as usize) {
@@ -107,7 +119,7 @@ fn for_each_line_of_part(
             strip.draw(block, lattice, t, projected)
         });
         strip.sort();
-        strip.for_each_line(&mut line);
+        strip.for_each_line(&stacks, &mut line);
     }
     lines
 }
@@ -170,13 +182,29 @@ impl Strip {
         }
     }
 
-    fn for_each_line(&mut self, line: &mut impl FnMut(usize, &[Hit])) {
+    fn for_each_line(&mut self, stacks: &Stacks, line: &mut impl FnMut(usize, &[Hit])) {
         let mut start = 0;
         for (k, &end) in self.end.iter().enumerate() {
             let hits = &mut self.hits[start..end as usize];
             hits.sort_unstable();
+            settle(stacks, self.first_line + k, hits);
             line(self.first_line + k, hits);
             start = end as usize;
+        }
+    }
+}
+
+/// Puts faces that are met at close depths in the order in which they lie; `hits` by depth, which they stay.
+fn settle(stacks: &Stacks, line: usize, hits: &mut [Hit]) {
+    let close = |a: &Hit, b: &Hit| b.depth() - a.depth() <= CLOSE;
+    if hits.is_sorted_by(|a, b| !close(a, b)) {
+        return;
+    }
+    for stack in hits.chunk_by_mut(close).filter(|stack| stack.len() > 1) {
+        let drawn = stack.to_vec();
+        let places = drawn.iter().map(|hit| (hit.depth(), hit.local_element()));
+        for (k, from) in stacks.order(line, places).into_iter().enumerate() {
+            stack[k] = drawn[from].at_depth(drawn[k].depth());
         }
     }
 }

@@ -4,9 +4,9 @@ use super::burial::bury;
 use super::fragments::Hit;
 use crate::block::Block;
 use crate::far_grid::{Exit, Passage};
+use crate::ground::{Along, Ground};
 use crate::lattice::{DEPTH_OF_TOP, Lattice};
 use crate::rows::Pair;
-use crate::soil::SoilGrid;
 
 /// Turns the sorted hits of a line into pairs that see each other.
 pub(crate) struct Sight<'a> {
@@ -14,7 +14,9 @@ pub(crate) struct Sight<'a> {
     lattice: &'a Lattice,
     soil: Option<SoilUnder>,
     sky: u32,
-    below: u32,
+    void: u32,
+    outer_soil: u32,
+    first_zone: u32,
     /// The sphere's radius in depth steps; `None` when nothing is ever that far away.
     radius: Option<u32>,
 }
@@ -26,13 +28,14 @@ impl<'a> Sight<'a> {
         Self {
             block,
             lattice,
-            soil: block.soil.map(|soil| SoilUnder::new(&soil, lattice)),
+            soil: block
+                .soil
+                .zip(block.ground)
+                .map(|(soil, ground)| SoilUnder::new(soil.z_m, ground, lattice)),
             sky: block.local(ends.sky()),
-            below: block.local(if block.soil.is_some() {
-                ends.outer_soil()
-            } else {
-                ends.void()
-            }),
+            void: block.local(ends.void()),
+            outer_soil: block.local(ends.outer_soil()),
+            first_zone: block.local(ends.zone(0)),
             radius: (steps < f64::from(u32::MAX)).then_some(steps as u32),
         }
     }
@@ -104,7 +107,7 @@ impl<'a> Sight<'a> {
         let (mut seen, mut depth) = (bottom, soil_depth);
         for hit in hits {
             if hit.depth().saturating_sub(depth) > radius {
-                if seen != self.below {
+                if !self.is_below(seen) {
                     looks.push((self.far_above(line, depth, radius), hit.face_against()));
                 }
                 looks.push((self.far_below(line, hit.depth(), radius), seen));
@@ -112,15 +115,20 @@ impl<'a> Sight<'a> {
             (seen, depth) = (hit.face_along(), hit.depth());
         }
         let above = self.far_above(line, depth, radius);
-        if above != self.sky && seen != self.below {
+        if above != self.sky && !self.is_below(seen) {
             looks.push((above, self.sky));
         }
     }
 
     /// What is at the lower end of a line.
     fn bottom(&self, line: usize) -> u32 {
-        let cell = self.soil.as_ref().and_then(|soil| soil.cell(line));
-        cell.map_or(self.below, |c| self.block.local(self.block.ends.soil(c)))
+        let soil = self.soil.as_ref();
+        soil.map_or(self.void, |soil| self.block.local(soil.end(line)))
+    }
+
+    /// Whether a local end is what lies below the scene, other than its soil.
+    fn is_below(&self, end: u32) -> bool {
+        end == self.void || end == self.outer_soil || end >= self.first_zone
     }
 
     /// What is seen upwards, where nothing is hit within the sphere.
@@ -140,10 +148,10 @@ impl<'a> Sight<'a> {
     /// The far end that stands for what is seen along a line past a depth; random by line and depth.
     fn far(&self, line: usize, depth: u32, direction_z: f64) -> u32 {
         let Some(grid) = &self.block.far else {
-            return if direction_z < 0.0 {
-                self.below
-            } else {
-                self.sky
+            return match (direction_z < 0.0, &self.soil) {
+                (false, _) => self.sky,
+                (true, Some(_)) => self.outer_soil,
+                (true, None) => self.void,
             };
         };
         let hash = ((line as u64) << 32 | u64::from(depth)).wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -162,34 +170,33 @@ impl<'a> Sight<'a> {
     }
 }
 
-/// The soil cells at the lower ends of the lines.
+/// The soil at the lower ends of the lines.
 struct SoilUnder {
     depth: u32,
-    /// Column and row of cells for each column and row of the lattice; `None` beyond the map.
-    column: Vec<Option<u32>>,
-    row: Vec<Option<u32>>,
-    columns: u32,
+    ground: Ground,
+    /// Column and row of the soil for each column and row of the lattice.
+    column: Vec<Along>,
+    row: Vec<Along>,
 }
 
 impl SoilUnder {
-    fn new(soil: &SoilGrid, lattice: &Lattice) -> Self {
-        let place = |i: u32, j: u32| lattice.point_at(f64::from(i), f64::from(j), soil.z_m);
-        let periodic = lattice.periodic;
+    fn new(z_m: f64, ground: Ground, lattice: &Lattice) -> Self {
+        let place = |i: u32, j: u32| lattice.point_at(f64::from(i), f64::from(j), z_m);
         Self {
-            depth: lattice.depth_of_height(soil.z_m),
+            depth: lattice.depth_of_height(z_m),
             column: (0..lattice.nx)
-                .map(|i| soil.along(0, place(i, 0).x, periodic))
+                .map(|i| ground.along(0, place(i, 0).x))
                 .collect(),
             row: (0..lattice.ny)
-                .map(|j| soil.along(1, place(0, j).y, periodic))
+                .map(|j| ground.along(1, place(0, j).y))
                 .collect(),
-            columns: soil.cells[0],
+            ground,
         }
     }
 
-    /// The cell at the lower end of a line.
-    fn cell(&self, line: usize) -> Option<u32> {
+    /// The end at the lower end of a line.
+    fn end(&self, line: usize) -> u32 {
         let nx = self.column.len();
-        Some(self.row[line / nx]? * self.columns + self.column[line % nx]?)
+        self.ground.end(self.column[line % nx], self.row[line / nx])
     }
 }

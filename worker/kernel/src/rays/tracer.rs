@@ -119,13 +119,12 @@ impl Tracer {
 /// What is seen when no triangle is hit within reach.
 fn beyond(block: &Block, ray: &FaceRay, soil_t: f64, (random, radius_m): (f64, f64)) -> u32 {
     let (ends, direction) = (&block.ends, ray.direction);
-    if let Some(soil) = block.soil
+    if let Some(ground) = &block.ground
         && soil_t.is_finite()
         && soil_t <= radius_m
     {
         let at = ray.origin + soil_t * direction;
-        let cell = soil.cell_at(at.truncate(), block.extent.periodic);
-        return block.local(cell.map_or(ends.outer_soil(), |c| ends.soil(c)));
+        return block.local(ground.end_at(at.truncate()));
     }
     let z = ray.origin.z + radius_m * direction.z;
     let (bottom, top) = (block.extent.min_m.z, block.extent.max_m.z);

@@ -16,6 +16,7 @@ use super::boxes::{Boxes, Shift};
 use super::meeting::Edges;
 use crate::block::Block;
 use crate::elements;
+use crate::touch::{lower_first, touch_m};
 
 /// A ray from a face.
 #[derive(Clone, Copy)]
@@ -43,6 +44,8 @@ pub(super) struct Tree {
     z_max_m: f64,
     /// What lies closer together than this touches, metres, where it is near the ray's origin.
     pub(super) touch_m: f64,
+    /// How far rounding carries a point near the ray's origin, metres.
+    rounding_m: f64,
 }
 
 /// A triangle, or a copy of it, with its vertices: a ray that comes to a leaf of the tree reads on in one
@@ -65,12 +68,10 @@ const HALF_EXTENT: f64 = 1e4;
 /// half extent.
 const ROUNDINGS: f64 = 6.0;
 
-/// Two surfaces touch when they are closer than this part of the largest coordinate and of the distance along
-/// the ray together: rounding in f64 says nothing of which is nearer. A point within a triangle is rounded
-/// four times, a copy one pattern away once by its user and once here, each in three coordinates by at most
-/// half a unit in the last place: 6 sqrt(3) < 12 halves. Where such surfaces lie in one plane they lie as the
-/// lines have them, by rising number from below.
-const TOUCH: f64 = 12.0 * 0.5 * f64::EPSILON;
+/// How far rounding carries the place where a ray meets a triangle, in parts of the distance along the ray: a point
+/// within a triangle is rounded four times, a copy one pattern away once by its user and once here, each in three
+/// coordinates by at most half a unit in the last place: 6 sqrt(3) < 12 halves.
+const ROUNDING: f64 = 12.0 * 0.5 * f64::EPSILON;
 
 /// A ray that has crossed this many patterns without a hit is taken to leave the canopy sideways.
 const MOST_PATTERNS: usize = 100_000;
@@ -90,7 +91,8 @@ impl Tree {
         }
         let centre = 0.5 * (lo + hi);
         let scale = HALF_EXTENT / (0.5 * (hi - lo)).max_element().max(f64::MIN_POSITIVE);
-        let touch_m = TOUCH * lo.abs().max(hi.abs()).max_element();
+        let touch_m = touch_m(extent);
+        let rounding_m = ROUNDING * lo.abs().max(hi.abs()).max_element();
         // and the nodes that obvhs takes as passed
         let padding = HALF_EXTENT * f64::from(f32::EPSILON) * ROUNDINGS + 2.0 * NEAREST_NODE;
 
@@ -126,6 +128,7 @@ impl Tree {
             z_min_m,
             z_max_m,
             touch_m,
+            rounding_m,
         }
     }
 
@@ -204,15 +207,17 @@ impl Tree {
                     else {
                         continue;
                     };
-                    let slack = self.touch_in_t(vertices_m, ray.direction, hit.t);
-                    if hit.t.abs() <= slack {
+                    let source = ray.source.map(|t| (t, block.soup.triangle(t as usize)));
+                    let left = source.as_ref().map(|(_, left)| left);
+                    if self.touch(hit.t, hit.t, ray.direction, (vertices_m, left)) {
                         // it touches what the ray leaves
-                        let ahead = match ray.source {
-                            Some(source) => {
+                        let ahead = match source {
+                            Some((source, left)) => {
                                 let moved = vertices_m.map(|v| v + block.shift_m(away));
-                                let left = block.soup.triangle(source as usize);
+                                let higher = place > (source, [0, 0]);
+                                let lower = if higher { &left } else { vertices_m };
                                 self.passes(&moved, &left, ray.direction)
-                                    .unwrap_or((place > (source, [0, 0])) == up)
+                                    .unwrap_or_else(|| higher == lower_first(lower, ray.direction))
                             }
                             None => up,
                         };
@@ -224,8 +229,12 @@ impl Tree {
                         continue;
                     }
                     let nearer = best.as_ref().is_none_or(|best| {
-                        if (hit.t - best.t).abs() <= slack {
-                            (place < best.place) == up
+                        let other = block.soup.triangle(best.place.0 as usize);
+                        let both = (vertices_m, Some(&other));
+                        if self.touch(hit.t - best.t, hit.t, ray.direction, both) {
+                            let is_lower = place < best.place;
+                            let lower = if is_lower { vertices_m } else { &other };
+                            is_lower == lower_first(lower, ray.direction)
                         } else {
                             hit.t < best.t
                         }
@@ -265,16 +274,31 @@ impl Tree {
         (!in_plane).then(|| side * normal.dot(direction) < 0.0)
     }
 
-    /// How far apart along a ray two surfaces like this one may be met and still touch.
-    fn touch_in_t(&self, triangle: &[DVec3; 3], direction: DVec3, t: f64) -> f64 {
-        let touch_m = self.touch_m + TOUCH * t.abs();
+    /// Whether two triangles touch that a ray meets so far apart, about `t` from its origin. Without a second one, what
+    /// is met first is the soil.
+    fn touch(
+        &self,
+        apart: f64,
+        t: f64,
+        direction: DVec3,
+        (triangle, other): (&[DVec3; 3], Option<&[DVec3; 3]>),
+    ) -> bool {
+        let rounding = ROUNDING * t.abs();
+        let (apart, touch_m) = (apart.abs(), self.touch_m + rounding);
         // far beyond any rounding no cosine need be known
-        if t.abs() > self.touch_m / SMALLEST_COSINE {
-            return touch_m;
+        if apart > touch_m / SMALLEST_COSINE {
+            return false;
         }
-        let normal = geometry::doubled_area_vector(triangle);
-        let cosine = (normal.dot(direction) / normal.length()).abs();
-        touch_m / cosine.max(SMALLEST_COSINE)
+        let cosine = |triangle: &[DVec3; 3]| {
+            let normal = geometry::doubled_area_vector(triangle);
+            (normal.dot(direction) / normal.length())
+                .abs()
+                .max(SMALLEST_COSINE)
+        };
+        let of_it = cosine(triangle);
+        let of_other = other.map_or(direction.z.abs(), cosine);
+        // a ray along a surface is not known to meet it to better than this
+        apart * of_it <= self.rounding_m + rounding || apart * of_it.max(of_other) <= touch_m
     }
 }
 
