@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::canopy::Organ;
 use crate::formats::{FormatError, MAX_COORDINATE, MAX_TRIANGLES, Place};
 use crate::inputs::LightFault;
 use crate::light::sky::SkyError;
@@ -45,6 +46,18 @@ pub enum LoadError {
         /// Their names.
         files: String,
     },
+    /// Two files have an organ of the same name, which would be one row of the results.
+    #[error(
+        "{again}: {organ} is in {first} already; expected every organ in one file: number plants or species through all files"
+    )]
+    OrganTwice {
+        /// Where it is met again.
+        again: Place,
+        /// The organ.
+        organ: Box<Organ>,
+        /// Where it is met first.
+        first: Place,
+    },
     /// All geometry files together hold too much.
     #[error("{files}: expected at most {MAX_TRIANGLES} triangles, found {found}")]
     TooManyTriangles {
@@ -75,6 +88,14 @@ pub enum LoadError {
         /// Its name.
         material: String,
         /// The band without it.
+        band: String,
+    },
+    /// Soil that lets light through.
+    #[error("{material} in band {band}: expected tau = 0, because it is declared to be soil")]
+    ClearSoil {
+        /// The material.
+        material: String,
+        /// The band.
         band: String,
     },
     /// There is soil, and a band without an albedo for it.

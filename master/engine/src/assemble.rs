@@ -6,7 +6,8 @@ use nestrad_kernel::far_grid::Exit;
 use crate::direct::Direct;
 use crate::exchange::Outlook;
 use crate::frame::Frame;
-use crate::solution::{Balance, Estimate, ItemLight, SoilMap, Solution};
+use crate::sinks::{SINKS, Sink};
+use crate::solution::{Balance, Estimate, ItemLight, MaterialLight, SoilMap, Solution};
 use crate::solver::{Irradiance, Variances};
 
 /// All that the results are put together from.
@@ -145,55 +146,76 @@ impl Parts<'_> {
 
     fn balance(&self, b: usize, solution: &Solution) -> Balance {
         let (bands, band) = (self.optics.len(), &self.optics.bands[b]);
-        let [mut plants, mut soil] = [0.0; 2];
-        for t in 0..self.frame.organ.len() {
+        let frame = self.frame;
+        let mut sinks = [0.0; SINKS];
+        let mut materials = vec![0.0; frame.kinds.len()];
+        for t in 0..frame.organ.len() {
             let absorbed = solution.triangles[t * bands + b].absorbed_W;
-            *(if self.frame.is_soil(t) {
-                &mut soil
-            } else {
-                &mut plants
-            }) += absorbed;
+            for &sink in Sink::of(frame.kind(t)) {
+                sinks[sink as usize] += absorbed;
+            }
+            materials[frame.material[t] as usize] += absorbed;
         }
-        for row in self.frame.ends.faces() as usize..self.frame.rows() {
-            soil += (1.0 - band.soil_albedo)
-                * self.frame.row_area_m2(row)
-                * self.irradiance_W_m2(row, b);
+        for row in frame.ends.faces() as usize..frame.rows() {
+            sinks[Sink::Soil as usize] +=
+                (1.0 - band.soil_albedo) * frame.row_area_m2(row) * self.irradiance_W_m2(row, b);
         }
         let [up, scattered_down] = self.solved(b).map_or([0.0; 2], |k| self.escaped_W(band, k));
-        let down = scattered_down + self.direct.passed_W[b];
+        sinks[Sink::Up as usize] = up;
+        sinks[Sink::Down as usize] = scattered_down + self.direct.passed_W[b];
         let incoming = self.direct.incoming_W[b] + self.outer_soil_W(b);
-        let mut variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
-        variance[4] += self.direct.closure_variance_W2[b];
-        let [of_plants, of_soil, scattered, caught] = self.direct.balance_variance_W2[b];
-        variance[0] += of_plants;
-        variance[1] += of_soil;
-        if self.frame.world.extent.periodic {
-            variance[3] += caught;
+        let missing = |left: f64, sink: Sink| left - sinks[sink as usize];
+        let closure = Sink::WHOLE.into_iter().fold(incoming, missing);
+        let none = Variances::default();
+        let variances = self.variances(b).unwrap_or(&none);
+        let estimate = |value: f64, variance: f64| Estimate {
+            value,
+            se: variance.sqrt(),
+        };
+        let direct = &self.direct.share_variances[b];
+        let mut sinks_W2 = variances.sinks_W2;
+        for (sum, direct_W2) in sinks_W2.iter_mut().zip(&direct.sinks_W2) {
+            *sum += direct_W2;
+        }
+        if frame.world.extent.periodic {
+            sinks_W2[Sink::Down as usize] += direct.caught_W2;
         }
         // of a little more scattered light the same parts leave as of all of it
         let once_W = self.direct.incoming_W[b]
             - self.direct.passed_W[b]
             - self.absorbed_at_once_W(b, solution);
-        for (k, leaving_W) in [(2, up), (3, scattered_down)] {
+        for (sink, leaving_W) in [(Sink::Up, up), (Sink::Down, scattered_down)] {
             let part = if once_W > 0.0 {
                 (leaving_W / once_W).clamp(0.0, 1.0)
             } else {
                 0.0
             };
-            variance[k] += part * part * scattered;
+            sinks_W2[sink as usize] += part * part * direct.scattered_W2;
         }
-        let estimate = |value: f64, k: usize| Estimate {
-            value,
-            se: variance[k].sqrt(),
+        let of = |sink: Sink| estimate(sinks[sink as usize], sinks_W2[sink as usize]);
+        let material = |(m, &absorbed): (usize, &f64)| MaterialLight {
+            name: frame.materials[m].clone(),
+            kind: frame.kinds[m],
+            absorbed_W: estimate(
+                absorbed,
+                variances.material_W2.get(m).copied().unwrap_or(0.0) + direct.material_W2[m],
+            ),
         };
         Balance {
             band: band.name.clone(),
             incoming_W: incoming,
-            absorbed_plants_W: estimate(plants, 0),
-            absorbed_soil_W: estimate(soil, 1),
-            escaped_up_W: estimate(up, 2),
-            escaped_down_W: estimate(down, 3),
-            closure_W: estimate(incoming - plants - soil - up - down, 4),
+            absorbed_plants_W: of(Sink::Plants),
+            absorbed_leaves_W: of(Sink::Leaves),
+            absorbed_stems_W: of(Sink::Stems),
+            absorbed_structures_W: of(Sink::Structures),
+            absorbed_soil_W: of(Sink::Soil),
+            escaped_up_W: of(Sink::Up),
+            escaped_down_W: of(Sink::Down),
+            closure_W: estimate(
+                closure,
+                variances.closure_W2 + self.direct.closure_variance_W2[b],
+            ),
+            materials: materials.iter().enumerate().map(material).collect(),
         }
     }
 

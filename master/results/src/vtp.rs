@@ -6,9 +6,10 @@
 //! at; the tables hold the figures.
 
 use std::collections::HashMap;
+use std::hash::Hash;
 use std::io::Write;
 
-use nestrad_common::canopy::Canopy;
+use nestrad_common::canopy::{Canopy, Organ};
 use nestrad_engine::solution::{ItemLight, Solution};
 
 use crate::error::Fault;
@@ -97,7 +98,7 @@ fn cell_arrays<'a>(
         ("irradiance_upper_W_m2", |light| light.irradiance_upper_W_m2),
         ("irradiance_lower_W_m2", |light| light.irradiance_lower_W_m2),
     ];
-    let mut arrays = Vec::with_capacity(3 * bands + 2);
+    let mut arrays = Vec::with_capacity(3 * bands + 4);
     for (band, band_name) in band_names.iter().enumerate() {
         for (quantity, value) in quantities {
             let cell = move |i| value(triangle_light_per_m2(solution, i, bands, band)) as f32;
@@ -105,41 +106,45 @@ fn cell_arrays<'a>(
             arrays.push(Array::new(name, triangles, Values::F32(Box::new(cell))));
         }
     }
-    let plants = plant_of_organ(canopy);
+    let plants = numbers(canopy, |organ| (&organ.species, &organ.plant));
+    let species = numbers(canopy, |organ| &organ.species);
+    let kinds = canopy.kinds();
     let organ = |i: usize| canopy.triangle(i).organ;
     let plant = move |i: usize| plants[organ(i) as usize];
+    let species = move |i: usize| species[organ(i) as usize];
+    let kind = move |i: usize| kinds[canopy.triangle(i).material as usize] as u32;
     arrays.push(Array::new("organ", triangles, Values::U32(Box::new(organ))));
     arrays.push(Array::new("plant", triangles, Values::U32(Box::new(plant))));
+    let cells = Values::U32(Box::new(species));
+    arrays.push(Array::new("species", triangles, cells));
+    // 0 leaf, 1 stem, 2 structure, 3 soil
+    arrays.push(Array::new("kind", triangles, Values::U32(Box::new(kind))));
     arrays
 }
 
-/// Plants are numbered from 0 in the order of their first organ, as organs are in the canopy.
-fn plant_of_organ(canopy: &Canopy) -> Vec<u32> {
-    let mut numbers: HashMap<&str, u32> = HashMap::new();
-    let number = |plant| {
+/// What organs are of, numbered from 0 in the order of its first organ, as organs are in the canopy.
+fn numbers<'a, T: Eq + Hash>(canopy: &'a Canopy, of: impl Fn(&'a Organ) -> T) -> Vec<u32> {
+    let mut numbers: HashMap<T, u32> = HashMap::new();
+    let number = |name| {
         let next = numbers.len() as u32;
-        *numbers.entry(plant).or_insert(next)
+        *numbers.entry(name).or_insert(next)
     };
-    canopy
-        .organs
-        .iter()
-        .map(|organ| organ.plant.as_str())
-        .map(number)
-        .collect()
+    canopy.organs.iter().map(of).map(number).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::DVec3;
-    use nestrad_common::canopy::{Mesh, Organ, Triangle};
+    use nestrad_common::canopy::{Material, Mesh, Triangle};
 
     const BAND: &str = "<\"blue\" & red>";
 
     fn canopy_and_solution() -> (Canopy, Solution) {
         let organ = |id: &str, plant: &str| Organ {
-            id: id.into(),
+            species: "1".into(),
             plant: plant.into(),
+            id: id.into(),
         };
         let triangle = |(corners_m, organ)| Triangle {
             corners_m,
@@ -149,6 +154,7 @@ mod tests {
         let triangles = [([DVec3::ZERO, DVec3::X, DVec3::Y], 2), ([DVec3::Z; 3], 0)];
         let mut canopy = Canopy::of_meshes(vec![Mesh::from_iter(triangles.map(triangle))]);
         canopy.organs = vec![organ("a", "p"), organ("b", "p"), organ("c", "q")];
+        canopy.materials = vec![Material::Stem { species: 1 }];
         canopy.origin_m = DVec3::new(10.0, 20.0, 30.0);
         let light = ItemLight {
             irradiance_upper_W_m2: 4.0,
@@ -252,6 +258,16 @@ mod tests {
                 "plant".into(),
                 "UInt32",
                 [1_u32, 0].into_iter().flat_map(u32::to_le_bytes).collect(),
+            ),
+            (
+                "species".into(),
+                "UInt32",
+                [0_u32, 0].into_iter().flat_map(u32::to_le_bytes).collect(),
+            ),
+            (
+                "kind".into(),
+                "UInt32",
+                [1_u32, 1].into_iter().flat_map(u32::to_le_bytes).collect(),
             ),
         ];
         let found = arrays(&file);

@@ -3,7 +3,7 @@
 use anyhow::Result;
 use clap::Args;
 use nestrad_common::assemble;
-use nestrad_common::inspection::Inspection;
+use nestrad_common::inspection::{Inspection, MaterialFacts};
 use nestrad_common::light::{Light, SkyLight};
 use nestrad_common::optics::FaceOptics;
 use nestrad_common::options::Options;
@@ -95,12 +95,13 @@ impl Facts {
                 Some(_) => "ground",
                 None => "the box around the scene",
             };
-            let index = format!("{index:.3} m², one-sided, without soil, per m² of {ground}");
+            let index = format!("{index:.3} m² of leaves and stems, one-sided, per m² of {ground}");
             self.line("area", &index);
         }
         for material in &facts.materials {
             let (triangles, area_m2) = (material.triangles, material.area_m2);
-            let text = format!("{}: {triangles} triangles, {area_m2:.4} m²", material.name);
+            let MaterialFacts { name, kind, .. } = material;
+            let text = format!("{name}: {triangles} triangles, {area_m2:.4} m², {kind}");
             self.line("material", &text);
         }
     }

@@ -17,11 +17,11 @@ mod outlines;
 mod probe;
 mod projection;
 mod shadow;
+mod shares;
 mod sky;
 mod systematic;
 mod tally;
 
-use nestrad_common::canopy::Material;
 use nestrad_common::light::{Source, Sources};
 use nestrad_common::optics::Optics;
 use nestrad_kernel::directions::{Purpose, stream};
@@ -29,6 +29,7 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 pub use effort::spread_effort;
+pub use shares::ShareVariances;
 
 use crate::frame::Frame;
 use crate::stop::Stopped;
@@ -52,9 +53,8 @@ pub struct Direct {
     pub shade_W_m2: Vec<f64>,
     /// Light that comes in, W per band: on the pattern, or on all that an open scene intercepts.
     pub incoming_W: Vec<f64>,
-    /// Variance of what plants absorb, of what the soil absorbs, of what both scatter and of what plants catch of it,
-    /// W² per band.
-    pub balance_variance_W2: Vec<[f64; 4]>,
+    /// How well it is known what it is shared out to, per band.
+    pub share_variances: Vec<ShareVariances>,
     /// Variance of the irradiance of each soil cell, W² m⁻⁴, indexed `cell * bands + band`.
     pub soil_variance_W2_m4: Vec<f64>,
     /// Variance of how much of the light that comes in is not accounted for, W² per band.
@@ -117,9 +117,8 @@ pub fn direct_light(
         add(&mut sum.incoming_W, &part.incoming_W);
         add(&mut sum.closure_variance_W2, &part.closure_variance_W2);
         add(&mut sum.soil_variance_W2_m4, &part.soil_variance_W2_m4);
-        let balances = sum.balance_variance_W2.iter_mut();
-        for (sum, part) in balances.zip(&part.balance_variance_W2) {
-            sum.iter_mut().zip(part).for_each(|(a, b)| *a += b);
+        for (sum, part) in sum.share_variances.iter_mut().zip(&part.share_variances) {
+            sum.add(part);
         }
         add(&mut sum.passed_W, &part.passed_W);
         sum.lines += part.lines;
@@ -149,7 +148,7 @@ impl Direct {
             shade_W_m2: vec![0.0; frame.ends.outer_zones as usize * bands],
             incoming_W: vec![0.0; bands],
             closure_variance_W2: vec![0.0; bands],
-            balance_variance_W2: vec![[0.0; 4]; bands],
+            share_variances: vec![ShareVariances::dark(frame.materials.len()); bands],
             soil_variance_W2_m4: vec![0.0; frame.ends.soil_cells as usize * bands],
             passed_W: vec![0.0; bands],
             lines: 0,
@@ -179,34 +178,14 @@ impl Direct {
                 Face::Leaf { material, upper } => {
                     band.materials[material as usize].absorptance(upper)
                 }
-                Face::Soil => 1.0 - band.soil_albedo,
+                Face::Soil => 0.0,
             };
             for outlines in lit.outlines.chunk_by(|a, b| a.organ == b.organ) {
                 let variance = outlines::variance(outlines, absorptance);
                 self.organ_variance_W2[outlines[0].organ as usize * bands + b] +=
                     variance * point_W * point_W;
             }
-            let is_soil = |face: Face| match face {
-                Face::Leaf { material, .. } => frame.materials[material as usize] == Material::Soil,
-                Face::Soil => true,
-            };
-            let of_kind = |soil: bool| {
-                let worth = |face| {
-                    if is_soil(face) == soil {
-                        absorptance(face)
-                    } else {
-                        0.0
-                    }
-                };
-                outlines::variance(&lit.scene, worth)
-            };
-            let scattered = outlines::variance(&lit.scene, |face| 1.0 - absorptance(face));
-            let caught =
-                outlines::variance(&lit.scene, |face| f64::from(u8::from(face != Face::Soil)));
-            let variances = [of_kind(false), of_kind(true), scattered, caught];
-            for (sum, variance) in self.balance_variance_W2[b].iter_mut().zip(variances) {
-                *sum += variance * point_W * point_W;
-            }
+            self.share_variances[b].add_direction(frame, band, &lit.scene, point_W);
             let all = lit.lines - if periodic { 0 } else { lit.missed };
             self.incoming_W[b] += point_W * all as f64;
             if periodic {

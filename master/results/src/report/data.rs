@@ -71,8 +71,10 @@ pub(crate) struct SpreadFacts {
 /// An organ and its light.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Organ {
+    pub(crate) species: String,
     pub(crate) plant: String,
     pub(crate) organ: String,
+    pub(crate) kind: String,
     pub(crate) area_m2: f64,
     /// Per band.
     pub(crate) light: Vec<OrganLight>,
@@ -94,6 +96,8 @@ pub(crate) struct Triangles {
     pub(crate) area_m2: Vec<f64>,
     /// Index of its organ in the table of organs.
     pub(crate) organ: Vec<u32>,
+    /// Whether it is a part of a plant.
+    pub(crate) plant: Vec<bool>,
     /// Bands of a triangle one after the other.
     pub(crate) light: Vec<PatchLight>,
 }
@@ -119,6 +123,9 @@ pub(crate) struct Results {
     pub(crate) triangles: Triangles,
     pub(crate) soil: Option<Soil>,
 }
+
+/// Kinds that are parts of plants.
+const PLANTS: [&str; 2] = ["leaf", "stem"];
 
 /// Reads a folder of results.
 pub(crate) fn read(folder: &Path) -> Result<Results, ReportError> {
@@ -167,8 +174,10 @@ fn summary(folder: &Path) -> Result<SummaryFacts, ReportError> {
 
 fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
     let columns = [
+        "species",
         "plant",
         "organ",
+        "kind",
         "area_m2",
         "band",
         "irradiance_upper_W_m2",
@@ -181,22 +190,24 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
     let mut rows = 0;
     let table = Table::read(folder.join("organs.csv"))?;
     table.rows(&columns, |row| {
-        row.must_be(3, &bands[rows % bands.len()])?;
+        row.must_be(5, &bands[rows % bands.len()])?;
         if rows.is_multiple_of(bands.len()) {
             organs.push(Organ {
-                plant: row.text(0).to_owned(),
-                organ: row.text(1).to_owned(),
-                area_m2: row.real(2)?,
+                species: row.text(0).to_owned(),
+                plant: row.text(1).to_owned(),
+                organ: row.text(2).to_owned(),
+                kind: row.text(3).to_owned(),
+                area_m2: row.real(4)?,
                 light: Vec::with_capacity(bands.len()),
             });
         }
         if let Some(organ) = organs.last_mut() {
             organ.light.push(OrganLight {
-                upper_W_m2: row.real(4)?,
-                lower_W_m2: row.real(5)?,
-                absorbed_W: row.real(6)?,
-                direct_W: row.real(7)?,
-                se_W: row.real(8)?,
+                upper_W_m2: row.real(6)?,
+                lower_W_m2: row.real(7)?,
+                absorbed_W: row.real(8)?,
+                direct_W: row.real(9)?,
+                se_W: row.real(10)?,
             });
         }
         rows += 1;
@@ -211,8 +222,10 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
 fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triangles, ReportError> {
     let columns = [
         "triangle",
+        "species",
         "plant",
         "organ",
+        "kind",
         "area_m2",
         "band",
         "irradiance_upper_W_m2",
@@ -220,11 +233,16 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
         "absorbed_W_m2",
         "absorbed_direct_W_m2",
     ];
-    let by_name: HashMap<(&str, &str), u32> = organs
-        .iter()
-        .zip(0..)
-        .map(|(organ, index)| ((organ.plant.as_str(), organ.organ.as_str()), index))
-        .collect();
+    let names = organs.iter().map(|organ| {
+        let Organ {
+            species,
+            plant,
+            organ,
+            ..
+        } = organ;
+        [species, plant, organ].map(String::as_str)
+    });
+    let by_name: HashMap<[&str; 3], u32> = names.zip(0..).collect();
     let mut found = Triangles::default();
     let table = Table::read(folder.join("triangles.csv"))?;
     table.rows(&columns, |row| {
@@ -235,18 +253,19 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
         if row.index(0)? != triangle {
             return Err(row.not(&format!("triangle {triangle}"), row.text(0)));
         }
-        row.must_be(4, &bands[band])?;
+        row.must_be(6, &bands[band])?;
         if band == 0 {
-            let name = (row.text(1), row.text(2));
+            let name = [1, 2, 3].map(|column| row.text(column));
             let organ = by_name.get(&name).copied();
-            let organ = organ.ok_or_else(|| row.not("an organ of organs.csv", row.text(2)))?;
+            let organ = organ.ok_or_else(|| row.not("an organ of organs.csv", row.text(3)))?;
             found.organ.push(organ);
-            found.area_m2.push(row.real(3)?);
+            found.plant.push(PLANTS.contains(&row.text(4)));
+            found.area_m2.push(row.real(5)?);
         }
         found.light.push(PatchLight {
-            irradiance_W_m2: row.real(5)? + row.real(6)?,
-            absorbed_W_m2: row.real(7)?,
-            direct_W_m2: row.real(8)?,
+            irradiance_W_m2: row.real(7)? + row.real(8)?,
+            absorbed_W_m2: row.real(9)?,
+            direct_W_m2: row.real(10)?,
         });
         Ok(())
     })?;

@@ -13,7 +13,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nestrad_common::assemble::load_canopy;
-use nestrad_common::canopy::{Canopy, Material};
+use nestrad_common::canopy::Canopy;
 use nestrad_common::geometry;
 use nestrad_common::inputs::Inputs;
 use nestrad_engine::solution::{Balance, BandAccount};
@@ -268,12 +268,12 @@ fn title(scenes: &[String]) -> String {
     scenes.join(", ")
 }
 
-/// All triangles that are not soil.
+/// All triangles of plants.
 fn patches(canopy: &Canopy, results: &Results) -> Vec<Patch> {
     let bands = results.bands.len();
     let numbered = canopy.triangles().enumerate();
     numbered
-        .filter(|(_, triangle)| *canopy.material_of(triangle) != Material::Soil)
+        .filter(|&(t, _)| results.triangles.plant[t])
         .map(|(t, triangle)| Patch {
             z_m: triangle.corners_m.iter().map(|v| v.z).sum::<f64>() / 3.0 + canopy.origin_m.z,
             area_m2: results.triangles.area_m2[t],

@@ -45,12 +45,19 @@ function pick(organ) {
   showPicked();
 }
 
+const manySpecies = new Set(report.organs.map((organ) => organ.species)).size > 1;
+
+// Species are named where there are several.
+function organName(organ) {
+  return `${manySpecies ? `species ${organ.species}, ` : ''}plant ${organ.plant}, organ ${organ.organ}`;
+}
+
 function showPicked() {
   const panel = element('picked');
   const organ = report.organs[state.picked];
   if (!organ) {
     const options = report.organs.length > 5000 ? '' : report.organs
-      .map((o, k) => `<option value="${k}">plant ${html(o.plant)}, organ ${html(o.organ)}</option>`).join('');
+      .map((o, k) => `<option value="${k}">${html(organName(o))}</option>`).join('');
     panel.innerHTML = '<h3>An organ’s numbers</h3><p class="hint">Click a leaf in the drawing' +
       (options ? `, or choose one:</p><select id="choose"><option value="-1">—</option>${options}</select>` : '.</p>');
     if (options) element('choose').addEventListener('change', (event) => pick(Number(event.target.value)));
@@ -59,8 +66,9 @@ function showPicked() {
   const per = (value) => (organ.area_m2 > 0 ? value / organ.area_m2 : 0);
   const rows = organ.light.map((light, band) => ({ name: report.bands[band], value: per(light.absorbed_W), se: per(light.se_W) }));
   const cells = (title, each) => [title, ...organ.light.map(each)];
-  panel.innerHTML = `<h3>Plant ${html(organ.plant)}, organ ${html(organ.organ)}</h3>` +
-    `<p class="hint">${figure(organ.area_m2 * 1e4)} cm², one-sided</p>` +
+  const name = organName(organ);
+  panel.innerHTML = `<h3>${html(name[0].toUpperCase() + name.slice(1))}</h3>` +
+    `<p class="hint">${html(organ.kind)}, ${figure(organ.area_m2 * 1e4)} cm², one-sided</p>` +
     `<p class="hint">Absorbed, per leaf area, ± one standard error</p>${errorBars(rows, 'W m⁻²')}` +
     table(['', ...report.bands.map(html)], [
       cells('absorbed, W m⁻²', (light) => withError(per(light.absorbed_W), per(light.se_W))),
@@ -101,7 +109,8 @@ function showProfiles() {
 }
 
 function showBalance() {
-  const flows = [['absorbed by plants', 'absorbed_plants_W'], ['absorbed by the soil', 'absorbed_soil_W'],
+  const flows = [['absorbed by plants', 'absorbed_plants_W'], ['… by leaves', 'absorbed_leaves_W'], ['… by stems', 'absorbed_stems_W'],
+    ['absorbed by structures', 'absorbed_structures_W'], ['absorbed by the soil', 'absorbed_soil_W'],
     ['escaped upwards', 'escaped_up_W'], ['escaped downwards', 'escaped_down_W'], ['closure', 'closure_W']];
   // where the canopy repeats, per ground; a scene that stands alone, as a whole
   const divisor = report.periodic ? report.ground_area_m2 : 1;
@@ -113,7 +122,18 @@ function showBalance() {
     rows.push([title, ...report.balance.map((b) => withError(b[key].value / divisor, b[key].se / divisor) + part(b[key].value, b.incoming_W))]);
   }
   element('balance').innerHTML = table([report.periodic ? 'W per m² of ground' : 'W, whole scene', ...report.balance.map((b) => html(b.band))], rows) +
+    ofMaterials(divisor, part) +
     '<p class="hint">± one standard error. Closure is what is left of incoming light; nothing is scaled to make it close, so it should be within a few of its own standard errors.</p>';
+}
+
+// What each material absorbs, where there are several.
+function ofMaterials(divisor, part) {
+  const { materials } = report.balance[0];
+  if (materials.length < 2) return '';
+  const order = ['leaf', 'stem', 'structure', 'soil'];
+  const numbers = materials.map((_, m) => m).sort((a, b) => order.indexOf(materials[a].kind) - order.indexOf(materials[b].kind) || a - b);
+  return table(['absorbed by', 'kind', ...report.balance.map((b) => html(b.band))], numbers.map((m) => [html(materials[m].name), materials[m].kind,
+    ...report.balance.map((b) => { const { value, se } = b.materials[m].absorbed_W; return withError(value / divisor, se / divisor) + part(value, b.incoming_W); })]));
 }
 
 function showErrors() {
