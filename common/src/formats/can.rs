@@ -21,7 +21,11 @@ pub fn parse(file: &str, bytes: &[u8]) -> Result<GeometryFile, FormatError> {
     let (mut polygon, mut cutter) = (Vec::new(), Cutter::default());
     let mut lines = Lines::new(file, bytes);
     while let Some(mut fields) = lines.next()? {
-        fields.keyword("p")?;
+        let mut found = fields.clone();
+        if fields.next() != Some(b"p") {
+            let expected = "'p', with which each line of a CAN file begins (the name of an OBJ file ends in .obj)";
+            return Err(fields.fault(expected, found.next()));
+        }
         let (organ, material) = groups.indices(&mut mesh, label(&mut fields)?);
         vertices(&mut fields, &mut polygon)?;
         mesh.push_polygon(&mut cutter, &fields, &polygon, organ, material)?;
@@ -321,12 +325,12 @@ mod tests {
         }
         assert_eq!(
             refusal(LEAF.replace("p ", "q ")),
-            "a.can, line 1: expected 'p', found 'q'"
+            "a.can, line 1: expected 'p', with which each line of a CAN file begins (the name of an OBJ file ends in .obj), found 'q'"
         );
         let error = refusal([0x7f, b'E', b'L', b'F', 0, 0, 0xff, b' ', 0x80]);
         assert_eq!(
             error,
-            "a.can, line 1: expected 'p', found '\\u{7f}ELF\\0\\0\u{fffd}'"
+            "a.can, line 1: expected 'p', with which each line of a CAN file begins (the name of an OBJ file ends in .obj), found '\\u{7f}ELF\\0\\0\u{fffd}'"
         );
     }
 

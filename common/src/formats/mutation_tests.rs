@@ -37,7 +37,7 @@ fn all_parsers_hold(bytes: &[u8]) {
     for source in checked(light::parse("f", bytes), bytes).unwrap_or_default() {
         assert!(source.irradiance_W_m2.is_finite() && source.irradiance_W_m2 >= 0.0);
         assert!((source.direction.length() - 1.0).abs() < 1e-12);
-        assert!(source.direction.z <= -light::MIN_DESCENT);
+        assert!(source.direction.z <= -crate::light::MIN_DESCENT);
     }
     if let Some(rectangle) = checked(pattern::parse("f", bytes), bytes) {
         assert!((rectangle.max - rectangle.min).min_element() >= pattern::MIN_SIDE);

@@ -44,6 +44,7 @@ pub(super) fn inputs(
     Ok(Inputs {
         scenes,
         unit: file.unit,
+        up: file.up,
         pattern: pattern.transpose()?,
         soil: file.soil.map(Spanned::into_inner),
         bands: bands.collect::<Result<_, _>>()?,

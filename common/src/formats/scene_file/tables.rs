@@ -9,13 +9,14 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use toml::Spanned;
 
-use crate::options::{Options, Unit};
+use crate::options::{Options, Unit, Up};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
     pub(super) scene: Option<OneOrMany>,
     pub(super) unit: Option<Unit>,
+    pub(super) up: Option<Up>,
     pub(super) pattern: Option<Spanned<PatternText>>,
     pub(super) soil: Option<Spanned<f64>>,
     #[serde(default)]
@@ -106,7 +107,9 @@ pub(super) struct LightTable {
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum SkyKind {
+    #[serde(alias = "uniform-overcast")]
     UniformOvercast,
+    #[serde(alias = "standard-overcast")]
     StandardOvercast,
     Clear,
 }
