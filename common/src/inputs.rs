@@ -7,10 +7,10 @@ use thiserror::Error;
 
 use crate::canopy::Kind;
 use crate::formats::Place;
-use crate::formats::light::is_irradiance;
-use crate::light::Sky;
+use crate::light::sun::{Sun, SunError};
+use crate::light::{AN_IRRADIANCE, Sky, is_irradiance};
 use crate::optics::LeafOptics;
-use crate::options::{Options, Unit};
+use crate::options::{Options, Unit, Up};
 
 /// The files and values that make a problem. Anything may be missing here; [`crate::assemble::load`]
 /// says what must be there.
@@ -20,6 +20,8 @@ pub struct Inputs {
     pub scenes: Vec<PathBuf>,
     /// Of geometry, pattern and soil height; metres where it is not given.
     pub unit: Option<Unit>,
+    /// The axis of the geometry files that points up; z where it is not given. Pattern, soil and light have z up.
+    pub up: Option<Up>,
     /// Where the canopy repeats; `None` for an isolated scene.
     pub pattern: Option<PatternInput>,
     /// Height of the soil plane in `unit`; `None` for a black void below.
@@ -43,6 +45,7 @@ impl Inputs {
         Self {
             scenes: first(self.scenes, other.scenes),
             unit: self.unit.or(other.unit),
+            up: self.up.or(other.up),
             pattern: self.pattern.or(other.pattern),
             soil: self.soil.or(other.soil),
             kinds: if self.kinds == KindsInput::default() {
@@ -127,10 +130,10 @@ impl LightInput {
             }
         }
         let Sky::Clear {
+            time_utc,
             latitude_deg,
             longitude_deg,
             diffuse_fraction,
-            ..
         } = sky
         else {
             return Ok(());
@@ -149,6 +152,7 @@ impl LightInput {
                 });
             }
         }
+        Sun::at(time_utc, *latitude_deg, *longitude_deg)?;
         Ok(())
     }
 }
@@ -157,7 +161,7 @@ impl LightInput {
 #[derive(Clone, Debug, Error, PartialEq)]
 pub enum LightFault {
     /// Less than no light, or no number.
-    #[error("irradiance in band {band}: expected 0 or 1e-100 to 1e100, found {found:e}")]
+    #[error("irradiance in band {band}: expected {AN_IRRADIANCE}, found {found:e}")]
     Irradiance {
         /// The band's name.
         band: String,
@@ -176,4 +180,7 @@ pub enum LightFault {
         /// As given.
         found: f64,
     },
+    /// There is no sun at that time and place.
+    #[error(transparent)]
+    Sun(#[from] SunError),
 }

@@ -1,7 +1,9 @@
 //! What is in a scene, and what is odd about it.
 
 use std::collections::{BTreeSet, HashMap};
+use std::fmt;
 use std::hash::{DefaultHasher, Hash, Hasher};
+use std::ops::RangeInclusive;
 
 use glam::{DVec2, DVec3};
 use serde::Serialize;
@@ -9,8 +11,9 @@ use serde::Serialize;
 use crate::canopy::{Canopy, Kind, Material};
 use crate::formats::Origins;
 use crate::geometry::{area, longest_edge};
+use crate::light::{Light, Source};
 
-/// Facts of a canopy. Lengths in metres, in the user's coordinates.
+/// Facts of a canopy and its light. Lengths in metres, in the user's coordinates.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct Inspection {
     /// As given, soil triangles included.
@@ -45,8 +48,45 @@ pub struct Inspection {
     /// How far the scene reaches beyond the pattern's edge; 0 for an isolated canopy. It comes in
     /// again on the other side.
     pub overhang_m: f64,
+    /// Where the sun stands: the one parallel source, if there is just one.
+    pub sun: Option<SunFacts>,
     /// Each a sentence, lower-case.
     pub warnings: Vec<String>,
+}
+
+/// Where the sun stands.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SunFacts {
+    /// Above the horizon, degrees.
+    pub elevation_deg: f64,
+    /// From north (y), clockwise (east, x, is 90), degrees.
+    pub azimuth_deg: f64,
+}
+
+impl SunFacts {
+    /// Of the parallel sources of a light, if there is just one.
+    pub fn of(suns: &[Source]) -> Option<Self> {
+        let [sun] = suns else {
+            return None;
+        };
+        Some(Self {
+            elevation_deg: sun.elevation_deg(),
+            azimuth_deg: sun.azimuth_deg(),
+        })
+    }
+}
+
+impl fmt::Display for SunFacts {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            elevation_deg,
+            azimuth_deg,
+        } = self;
+        write!(
+            f,
+            "{elevation_deg:.2} degrees above the horizon, azimuth {azimuth_deg:.2} degrees from north (y) over east (x)"
+        )
+    }
 }
 
 /// What there is of a material.
@@ -64,6 +104,9 @@ pub struct MaterialFacts {
 
 /// Beyond this distance the user's coordinates, as doubles, are coarser than a micrometre.
 const FAR_M: f64 = 1e-6 / f64::EPSILON;
+
+/// A scene that is smaller or larger than this is no canopy in metres, as likely as not.
+const USUAL_EXTENT_M: RangeInclusive<f64> = 0.01..=10_000.0;
 
 /// Looks through a canopy; `origins` serves to name file and line in the warnings.
 pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
@@ -103,6 +146,13 @@ pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
             farthest.max_element()
         ));
     }
+    let extent_m = (upper - lower).max_element();
+    if !USUAL_EXTENT_M.contains(&extent_m) {
+        facts.warnings.push(format!(
+            "the whole scene is {} across: the unit may be wrong (m, cm or mm)",
+            metres(extent_m)
+        ));
+    }
     if let Some(pattern) = canopy.pattern
         && facts.overhang_m > 10.0 * pattern.size_m.max_element()
     {
@@ -114,7 +164,22 @@ pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
     facts
 }
 
+/// A length that may be of any order.
+fn metres(length_m: f64) -> String {
+    if (1e-3..1e6).contains(&length_m) {
+        format!("{} m", (length_m * 1e6).round() / 1e6)
+    } else {
+        format!("{length_m:.1e} m")
+    }
+}
+
 impl Inspection {
+    /// Takes in the light, of these bands.
+    pub fn add_light(&mut self, light: &Light, bands: &[&str]) {
+        self.sun = SunFacts::of(&light.suns);
+        self.warnings.extend(light.warnings(bands));
+    }
+
     fn areas(&mut self, canopy: &Canopy, origins: &Origins, extent: DVec2) {
         let new = |(material, kind): (&Material, Kind)| MaterialFacts {
             name: material.to_string(),

@@ -3,6 +3,7 @@
 use std::fmt;
 use std::str::FromStr;
 
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -126,6 +127,44 @@ impl fmt::Display for Unit {
             Self::Centimetre => "cm",
             Self::Millimetre => "mm",
         })
+    }
+}
+
+/// The axis that points up in the user's geometry files.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Up {
+    /// As everywhere inside.
+    #[default]
+    Z,
+    /// As in many programs for drawing.
+    Y,
+}
+
+impl Up {
+    /// Stands upright what has this axis up: x stays, and of y up the file's y becomes z and its z becomes -y.
+    pub fn stand(self, DVec3 { x, y, z }: DVec3) -> DVec3 {
+        match self {
+            Self::Z => DVec3::new(x, y, z),
+            // 0 - 0 is 0, where -0 is another number
+            Self::Y => DVec3::new(x, 0.0 - z, y),
+        }
+    }
+}
+
+impl FromStr for Up {
+    type Err = OptionFault;
+
+    fn from_str(text: &str) -> Result<Self, OptionFault> {
+        match text {
+            "z" => Ok(Self::Z),
+            "y" => Ok(Self::Y),
+            _ => Err(OptionFault {
+                option: "up",
+                expected: "y or z",
+                found: text.to_owned(),
+            }),
+        }
     }
 }
 

@@ -28,7 +28,10 @@ pub struct BandOptics {
 impl BandOptics {
     pub(super) fn read(band: &BandInput) -> Result<Self, LoadError> {
         let opt = match &band.optics {
-            Some(path) => Some(parse(&name(path), &read(path, MAX_SMALL_BYTES)?)?),
+            Some(path) => Some(parse(
+                &name(path),
+                &read(path, MAX_SMALL_BYTES, "optics (.opt)")?,
+            )?),
             None => None,
         };
         Ok(Self {

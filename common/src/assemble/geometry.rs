@@ -9,7 +9,7 @@ use super::{LoadError, species};
 use crate::canopy::{Canopy, Material, Mesh, Organ, Pattern};
 use crate::formats::pattern::Rectangle;
 use crate::formats::{GeometryFile, MAX_COORDINATE, MAX_TRIANGLES, Origins, Place, numbered};
-use crate::options::Unit;
+use crate::options::{Unit, Up};
 
 /// The geometry of a canopy as the user gave it.
 #[derive(Clone, Debug, Default)]
@@ -22,9 +22,11 @@ pub struct Geometry {
     pub soil: Option<f64>,
     /// Of all of it.
     pub unit: Unit,
+    /// Of the files; the pattern and the soil have z up.
+    pub up: Up,
 }
 
-/// Joins the files, converts to metres and moves everything to a local origin: the lower corner of
+/// Joins the files, stands them upright, converts to metres and moves everything to a local origin: the lower corner of
 /// the pattern, or else of the scene, at the height of the scene's lowest vertex. There a double
 /// resolves every leaf, and nothing later needs to know how far away the user's origin is.
 ///
@@ -36,6 +38,7 @@ pub fn build_canopy(geometry: Geometry) -> Result<(Canopy, Origins), LoadError> 
         pattern,
         soil,
         unit,
+        up,
     } = geometry;
     let names = || {
         let names: Vec<&str> = files.iter().map(|file| file.file.as_str()).collect();
@@ -63,7 +66,7 @@ pub fn build_canopy(geometry: Geometry) -> Result<(Canopy, Origins), LoadError> 
     let per_metre = unit.per_metre();
     let mut lower = DVec3::INFINITY;
     for vertex in joined.vertices() {
-        *vertex /= per_metre;
+        *vertex = up.stand(*vertex) / per_metre;
         lower = lower.min(*vertex);
     }
     let pattern = pattern.map(|pattern| {

@@ -19,7 +19,7 @@ pub struct LightFile {
 
 impl LightFile {
     pub(super) fn read(path: &Path) -> Result<Self, LoadError> {
-        let bytes = read(path, MAX_SMALL_BYTES)?;
+        let bytes = read(path, MAX_SMALL_BYTES, "light (.light)")?;
         Ok(Self {
             sources: parse(&name(path), &bytes)?,
             band: None,

@@ -2,6 +2,8 @@
 
 mod bands;
 mod error;
+mod examine;
+mod files;
 mod geometry;
 mod kinds;
 mod lights;
@@ -9,14 +11,11 @@ mod species;
 #[cfg(test)]
 mod tests;
 
-use std::path::Path;
 use std::sync::Arc;
 
 use crate::canopy::Canopy;
-use crate::formats::pattern::Rectangle;
-use crate::formats::read::{MAX_GEOMETRY_BYTES, MAX_SMALL_BYTES, read};
-use crate::formats::{self, FormatError, GeometryFile, Origins};
-use crate::inputs::{Inputs, LightInput, PatternInput};
+use crate::formats::{GeometryFile, Origins};
+use crate::inputs::{Inputs, LightInput};
 use crate::inspection::{Inspection, inspect};
 use crate::light::{Light, Source};
 use crate::optics::Optics;
@@ -24,6 +23,9 @@ use crate::scene::Scene;
 
 pub use bands::{BandOptics, resolve_band};
 pub use error::LoadError;
+pub use examine::{Examined, examine};
+use files::name;
+pub use files::{is_scene_file, load_scene_file};
 pub use geometry::{Geometry, build_canopy};
 pub use lights::{LightFile, merge_sources};
 
@@ -36,21 +38,12 @@ pub struct Loaded {
     pub inspection: Inspection,
 }
 
-/// Reads a scene file. What it leaves out may come from the command line.
-pub fn load_scene_file(path: &Path) -> Result<Inputs, LoadError> {
-    let bytes = read(path, MAX_SMALL_BYTES)?;
-    let folder = path.parent().unwrap_or(Path::new(""));
-    Ok(formats::scene_file::parse(&name(path), &bytes, folder)?)
-}
-
 /// Reads all files of `inputs` and makes a checked scene of them.
 pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
     inputs.options.check()?;
     let bands = band_names(inputs)?;
     if inputs.scenes.is_empty() {
-        return Err(LoadError::Missing {
-            expected: "a scene: a CAN or OBJ file",
-        });
+        return Err(NO_SCENE);
     }
     let Some(light) = &inputs.light else {
         return Err(LoadError::Missing {
@@ -66,27 +59,26 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
         .map(BandOptics::read)
         .collect::<Result<Vec<_>, _>>()?;
     let light = self::light(light, &bands)?;
-    let (canopy, origins) = read_canopy(inputs)?;
+    let (canopy, origins, mut inspection) = inspected(inputs)?;
     let bands = optics
         .into_iter()
         .map(|optics| resolve_band(optics, &canopy, &origins))
         .collect::<Result<_, _>>()?;
-    let mut inspection = inspect(&canopy, &origins);
-    inspection.warnings.extend(kinds::unknown(inputs, &canopy));
-    if light.is_dark() {
-        inspection
-            .warnings
-            .push("no source has any light in any band".to_owned());
-    }
+    let optics = Optics { bands };
+    inspection.add_light(&light, &optics.names());
     Ok(Loaded {
         scene: Scene {
             canopy: Arc::new(canopy),
-            optics: Arc::new(Optics { bands }),
+            optics: Arc::new(optics),
             light: Arc::new(light),
         },
         inspection,
     })
 }
+
+const NO_SCENE: LoadError = LoadError::Missing {
+    expected: "a scene: a CAN or OBJ file",
+};
 
 /// The light of an input, which is the same for whoever solves: here, or a master elsewhere.
 fn light(input: &LightInput, bands: &[String]) -> Result<Light, LoadError> {
@@ -104,13 +96,16 @@ fn light(input: &LightInput, bands: &[String]) -> Result<Light, LoadError> {
     })
 }
 
-/// Looks through the geometry alone, as [`load`] would: for scenes whose optics or light are not good
-/// yet.
-pub fn inspect_geometry(inputs: &Inputs) -> Result<Inspection, LoadError> {
-    let (canopy, origins) = read_canopy(inputs)?;
+/// Reads the geometry and looks through it.
+fn inspected(inputs: &Inputs) -> Result<(Canopy, Origins, Inspection), LoadError> {
+    let geometry = read_geometry(inputs)?;
+    let of_files = geometry.files.iter();
+    let warnings: Vec<String> = of_files.flat_map(|file| file.warnings.clone()).collect();
+    let (canopy, origins) = build_canopy(geometry)?;
     let mut inspection = inspect(&canopy, &origins);
+    inspection.warnings.splice(0..0, warnings);
     inspection.warnings.extend(kinds::unknown(inputs, &canopy));
-    Ok(inspection)
+    Ok((canopy, origins, inspection))
 }
 
 /// Reads the canopy alone, in metres: where it stands is all that a drawing of results needs.
@@ -125,15 +120,18 @@ fn read_canopy(inputs: &Inputs) -> Result<(Canopy, Origins), LoadError> {
 }
 
 fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {
+    let files = inputs.scenes.iter();
+    let files = files.map(|path| files::read_geometry_file(path));
     Ok(Geometry {
-        pattern: inputs.pattern.as_ref().map(read_pattern).transpose()?,
+        pattern: inputs
+            .pattern
+            .as_ref()
+            .map(files::read_pattern)
+            .transpose()?,
         soil: inputs.soil,
         unit: inputs.unit.unwrap_or_default(),
-        files: inputs
-            .scenes
-            .iter()
-            .map(|path| read_geometry_file(path))
-            .collect::<Result<_, _>>()?,
+        up: inputs.up.unwrap_or_default(),
+        files: files.collect::<Result<Vec<GeometryFile>, _>>()?,
     })
 }
 
@@ -150,33 +148,4 @@ fn band_names(inputs: &Inputs) -> Result<Vec<String>, LoadError> {
         }
     }
     Ok(names)
-}
-
-fn read_geometry_file(path: &Path) -> Result<GeometryFile, FormatError> {
-    let bytes = read(path, MAX_GEOMETRY_BYTES)?;
-    let file = name(path);
-    let lower = file.to_lowercase();
-    if lower.ends_with(".obj") || lower.ends_with(".obj.gz") {
-        formats::obj::parse(&file, &bytes)
-    } else {
-        formats::can::parse(&file, &bytes)
-    }
-}
-
-fn read_pattern(pattern: &PatternInput) -> Result<Rectangle, LoadError> {
-    match pattern {
-        PatternInput::File(path) => {
-            let bytes = read(path, MAX_SMALL_BYTES)?;
-            Ok(formats::pattern::parse(&name(path), &bytes)?)
-        }
-        PatternInput::Corners(corners) => {
-            Rectangle::from_corners(*corners).ok_or_else(|| LoadError::Pattern {
-                found: corners.map(|value| value.to_string()).join(" "),
-            })
-        }
-    }
-}
-
-fn name(path: &Path) -> String {
-    path.display().to_string()
 }

@@ -1,6 +1,6 @@
 //! CAN: one polygon a line, with a label that says which leaf of which plant it is.
 //!
-//! `p N label... V x y z ...`: N labels, of which the first counts; V vertices of a convex polygon.
+//! `p N label... V x y z ...`: N labels, of which the first counts; V vertices of a polygon.
 //! From the right, a label is element (3 digits), leaf (3), plant (5), species (what is left).
 
 use std::collections::HashMap;
@@ -11,22 +11,24 @@ use glam::DVec3;
 use super::error::FormatError;
 use super::geometry_file::{GeometryFile, numbered, vertex};
 use super::lines::{Fields, Lines};
+use super::polygon::{Cutter, MAX_VERTICES};
 use crate::canopy::{Material, Organ};
-
-/// A polygon of more vertices is taken for a garbled count.
-pub const MAX_VERTICES: usize = 10_000;
 
 /// Parses a CAN file (unpacked); `file` is its name in messages.
 pub fn parse(file: &str, bytes: &[u8]) -> Result<GeometryFile, FormatError> {
     let mut mesh = GeometryFile::new(file);
     let mut groups = Groups::default();
-    let mut polygon = Vec::new();
+    let (mut polygon, mut cutter) = (Vec::new(), Cutter::default());
     let mut lines = Lines::new(file, bytes);
     while let Some(mut fields) = lines.next()? {
-        fields.keyword("p")?;
+        let mut found = fields.clone();
+        if fields.next() != Some(b"p") {
+            let expected = "'p', with which each line of a CAN file begins (the name of an OBJ file ends in .obj)";
+            return Err(fields.fault(expected, found.next()));
+        }
         let (organ, material) = groups.indices(&mut mesh, label(&mut fields)?);
         vertices(&mut fields, &mut polygon)?;
-        mesh.push_polygon(&fields, &polygon, organ, material)?;
+        mesh.push_polygon(&mut cutter, &fields, &polygon, organ, material)?;
     }
     Ok(mesh)
 }
@@ -215,9 +217,41 @@ mod tests {
     }
 
     #[test]
+    fn fault_a_concave_polygon_was_cut_as_a_fan() {
+        let file = parsed("p 1 100001001001 6 2 0 1 2 1 1 1 1 1 1 2 1 0 2 1 0 0 1\n");
+        let doubled = |[a, b, c]: [DVec3; 3]| (b - a).cross(c - a);
+        let doubled: Vec<DVec3> = corners(&file).into_iter().map(doubled).collect();
+        assert!(doubled.iter().all(|area| area.z > 0.0));
+        assert_eq!(
+            doubled.into_iter().sum::<DVec3>(),
+            DVec3::new(0.0, 0.0, 6.0)
+        );
+        assert_eq!(file.line, [1; 4]);
+    }
+
+    #[test]
+    fn polygons_that_cross_themselves_or_are_not_flat_are_refused() {
+        let bow_tie = format!("{LEAF}p 1 100001001001 4 0 0 1 1 1 1 1 0 1 0 1 1\n");
+        assert_eq!(
+            refusal(bow_tie),
+            "a.can, line 2: expected a polygon whose edges do not cross, found the edges from vertex 1 \
+             and from vertex 3, which do"
+        );
+        assert_eq!(
+            refusal("p 1 100001001001 4 0 0 1 1 0 1 1 1 3 0 1 1\n"),
+            "a.can, line 1: expected a nearly flat polygon, of whose triangles the area is at most 10 % \
+             more than that in its mean plane, found 29 % more"
+        );
+    }
+
+    #[test]
     fn line_ends_of_all_systems_and_a_byte_order_mark_are_read() {
         let plain = parsed(&LEAF.repeat(2));
-        assert_eq!(parsed(&LEAF.repeat(2).replace('\n', "\r\n")), plain);
+        for end in ["\r\n", "\r"] {
+            assert_eq!(parsed(&LEAF.repeat(2).replace('\n', end)), plain);
+            let error = refusal(format!("#{end}{end}p 1{end}"));
+            assert!(error.starts_with("a.can, line 3: "), "{error}");
+        }
         assert_eq!(parsed(&format!("\u{feff}{LEAF}{LEAF}")), plain);
         assert_eq!(parsed(&LEAF.repeat(2).replace(' ', "\t  ")), plain);
     }
@@ -294,12 +328,12 @@ mod tests {
         }
         assert_eq!(
             refusal(LEAF.replace("p ", "q ")),
-            "a.can, line 1: expected 'p', found 'q'"
+            "a.can, line 1: expected 'p', with which each line of a CAN file begins (the name of an OBJ file ends in .obj), found 'q'"
         );
         let error = refusal([0x7f, b'E', b'L', b'F', 0, 0, 0xff, b' ', 0x80]);
         assert_eq!(
             error,
-            "a.can, line 1: expected 'p', found '\\u{7f}ELF\\0\\0\u{fffd}'"
+            "a.can, line 1: expected 'p', with which each line of a CAN file begins (the name of an OBJ file ends in .obj), found '\\u{7f}ELF\\0\\0\u{fffd}'"
         );
     }
 

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 use super::error::{FormatError, Place};
 use super::lines::Fields;
+use super::polygon::Cutter;
 use crate::canopy::{Material, Mesh, Organ, Triangle, Welder};
 
 /// Farther from zero no coordinate is taken: at this distance a double still resolves 0.1 mm in
@@ -30,6 +31,8 @@ pub struct GeometryFile {
     pub organs: Vec<Organ>,
     /// In order of first appearance.
     pub materials: Vec<Material>,
+    /// What of the file is not in the mesh, each a sentence, lower-case.
+    pub warnings: Vec<String>,
     welder: Welder,
 }
 
@@ -55,29 +58,31 @@ impl GeometryFile {
         }
     }
 
-    /// Adds a convex polygon as a fan of triangles around its first vertex.
+    /// Adds a polygon as triangles.
     pub(super) fn push_polygon(
         &mut self,
+        cutter: &mut Cutter,
         fields: &Fields<'_>,
         polygon: &[DVec3],
         organ: u32,
         material: u32,
     ) -> Result<(), FormatError> {
-        let [first, rest @ ..] = polygon else {
-            return Ok(());
+        let content = |expected: String, found: String| FormatError::Content {
+            place: fields.place(),
+            expected,
+            found,
         };
-        if self.mesh.len() + rest.len() > MAX_TRIANGLES {
-            return Err(FormatError::Content {
-                place: fields.place(),
-                expected: format!("at most {MAX_TRIANGLES} triangles"),
-                found: "more".to_owned(),
-            });
+        let cut = cutter.cut(polygon);
+        let triangles = cut.map_err(|fault| content(fault.expected(), fault.to_string()))?;
+        if self.mesh.len() + triangles.len() > MAX_TRIANGLES {
+            let expected = format!("at most {MAX_TRIANGLES} triangles");
+            return Err(content(expected, "more".to_owned()));
         }
         // a line holds a byte or more, so only a file of 4 GiB of blank lines could saturate this
         let line = u32::try_from(fields.line()).unwrap_or(u32::MAX);
-        for edge in rest.windows(2) {
+        for corners in triangles {
             self.push(&Triangle {
-                corners_m: [*first, edge[0], edge[1]],
+                corners_m: corners.map(|vertex| polygon[vertex]),
                 organ,
                 material,
             });

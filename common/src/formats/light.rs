@@ -4,15 +4,7 @@ use glam::DVec3;
 
 use super::error::FormatError;
 use super::lines::{Fields, Lines};
-
-/// Sources closer to the horizon than this (the sine of 0.006 degrees) are refused as horizontal:
-/// at a given irradiance of the horizontal their beams would be without bounds.
-pub const MIN_DESCENT: f64 = 1e-4;
-
-/// Whether an irradiance can be computed with: 0, or large and small enough for its square to be a number.
-pub fn is_irradiance(value_W_m2: f64) -> bool {
-    value_W_m2 == 0.0 || (1e-100..=1e100).contains(&value_W_m2)
-}
+use crate::light::{AN_IRRADIANCE, MIN_DESCENT, POINTS_DOWN, is_irradiance};
 
 /// A parallel source in one band, or in all bands alike.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -48,7 +40,7 @@ fn source(fields: &mut Fields<'_>) -> Result<LightSource, FormatError> {
         let found = format!("{irradiance_W_m2:e}");
         return Err(fault(
             fields,
-            "an irradiance of 0 or 1e-100 to 1e100",
+            &format!("an irradiance of {AN_IRRADIANCE}"),
             found,
         ));
     }
@@ -62,7 +54,7 @@ fn source(fields: &mut Fields<'_>) -> Result<LightSource, FormatError> {
     if !direction.is_finite() || direction.z > -MIN_DESCENT {
         return Err(fault(
             fields,
-            "a direction of travel that points down (z below 0)",
+            POINTS_DOWN,
             format!("{} {} {}", given.x, given.y, given.z),
         ));
     }

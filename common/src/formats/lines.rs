@@ -8,11 +8,17 @@ use super::error::{FormatError, Place, excerpt};
 /// A longer line is no line of any of these formats, but a file of another kind.
 pub(super) const MAX_LINE_BYTES: usize = 1 << 20;
 
-/// Lines with something in them: neither blank nor only a comment.
+/// Lines with something in them: neither blank nor only a comment. They end as on any system: with a line feed, a
+/// carriage return, or both.
 pub(super) struct Lines<'a> {
     file: &'a str,
     rest: &'a [u8],
+    /// Of the line that was read last, or of its first part.
     number: usize,
+    /// Of the line that comes next.
+    next: usize,
+    /// A backslash at its end joins a line to the next.
+    joined: bool,
 }
 
 impl<'a> Lines<'a> {
@@ -22,41 +28,64 @@ impl<'a> Lines<'a> {
             file,
             rest,
             number: 0,
+            next: 1,
+            joined: false,
+        }
+    }
+
+    /// Lines that a backslash at their end joins to the next, as in OBJ.
+    pub(super) fn joined(file: &'a str, bytes: &'a [u8]) -> Self {
+        Self {
+            joined: true,
+            ..Self::new(file, bytes)
         }
     }
 
     /// The next line that says something; `None` at the end of the file.
     pub(super) fn next(&mut self) -> Result<Option<Fields<'a>>, FormatError> {
         while !self.rest.is_empty() {
-            self.number += 1;
-            let window = &self.rest[..self.rest.len().min(MAX_LINE_BYTES + 1)];
-            let line = match window.iter().position(|&byte| byte == b'\n') {
-                Some(end) => {
-                    self.rest = &self.rest[end + 1..];
-                    &window[..end]
-                }
-                None if window.len() > MAX_LINE_BYTES => {
-                    return Err(FormatError::Content {
-                        place: Place::line(self.file, self.number),
-                        expected: format!("a line of at most {MAX_LINE_BYTES} bytes"),
-                        found: format!("a longer one: {}", excerpt(window)),
-                    });
-                }
-                None => {
-                    self.rest = &[];
-                    window
-                }
-            };
+            self.number = self.next;
             let fields = Fields {
                 file: self.file,
                 line: self.number,
-                rest: line,
+                rest: self.line()?,
             };
             if fields.clone().next().is_some() {
                 return Ok(Some(fields));
             }
         }
         Ok(None)
+    }
+
+    /// Takes a line off the rest.
+    fn line(&mut self) -> Result<&'a [u8], FormatError> {
+        let window = &self.rest[..self.rest.len().min(MAX_LINE_BYTES + 1)];
+        let mut from = 0;
+        loop {
+            let end = window[from..].iter().position(|byte| is_line_end(*byte));
+            let line = &window[..end.map_or(window.len(), |end| from + end)];
+            // a path in a comment may end in a backslash
+            let goes_on = self.joined && line.ends_with(b"\\") && !has_comment(&line[from..]);
+            let after = &self.rest[line.len()..];
+            from = line.len() + if after.starts_with(b"\r\n") { 2 } else { 1 };
+            self.next += 1;
+            let all = window.len() <= MAX_LINE_BYTES && from >= window.len();
+            if all || end.is_some() && !goes_on {
+                self.rest = self.rest.get(from..).unwrap_or_default();
+                return Ok(if goes_on {
+                    &line[..line.len() - 1]
+                } else {
+                    line
+                });
+            }
+            if from >= window.len() {
+                return Err(FormatError::Content {
+                    place: Place::line(self.file, self.number),
+                    expected: format!("a line of at most {MAX_LINE_BYTES} bytes"),
+                    found: format!("a longer one: {}", excerpt(window)),
+                });
+            }
+        }
     }
 
     /// The line that was read last.
@@ -92,17 +121,35 @@ impl<'a> Fields<'a> {
     }
 
     pub(super) fn next(&mut self) -> Option<&'a [u8]> {
-        let start = self.rest.iter().position(|b| !b.is_ascii_whitespace())?;
-        let rest = &self.rest[start..];
+        let mut rest = self.rest.trim_ascii_start();
+        while is_joint(rest) {
+            rest = rest[1..].trim_ascii_start();
+        }
+        if rest.is_empty() {
+            self.rest = rest;
+            return None;
+        }
         if rest[0] == b'#' {
             self.rest = &[];
             return None;
         }
-        let end = rest
-            .iter()
-            .position(u8::is_ascii_whitespace)
-            .unwrap_or(rest.len());
+        let mut end = 0;
+        while end < rest.len() && !is_blank(rest[end]) && !is_joint(&rest[end..]) {
+            end += 1;
+        }
         let (field, rest) = rest.split_at(end);
+        self.rest = rest;
+        Some(field)
+    }
+
+    /// The same in a name, in which a number may have a `#` before it: `leaf #2` is no `leaf`.
+    pub(super) fn next_of_name(&mut self) -> Option<&'a [u8]> {
+        let rest = self.rest.trim_ascii_start();
+        if !matches!(rest, [b'#', b'0'..=b'9', ..]) {
+            return self.next();
+        }
+        let end = rest.iter().position(|byte| is_blank(*byte));
+        let (field, rest) = rest.split_at(end.unwrap_or(rest.len()));
         self.rest = rest;
         Some(field)
     }
@@ -146,13 +193,6 @@ impl<'a> Fields<'a> {
         }
     }
 
-    /// The rest of the line as text, for names that may hold blanks.
-    pub(super) fn text(&mut self) -> &'a [u8] {
-        let text = self.rest.trim_ascii();
-        self.rest = &[];
-        text
-    }
-
     /// The error for a field, or for the end of the line where a field should be.
     pub(super) fn fault(&self, expected: impl Display, found: Option<&[u8]>) -> FormatError {
         FormatError::Content {
@@ -161,4 +201,23 @@ impl<'a> Fields<'a> {
             found: found.map_or_else(|| "the end of the line".to_owned(), excerpt),
         }
     }
+}
+
+fn is_line_end(byte: u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
+}
+
+fn is_blank(byte: u8) -> bool {
+    byte.is_ascii_whitespace()
+}
+
+/// A backslash that joins a line to the next.
+fn is_joint(bytes: &[u8]) -> bool {
+    matches!(bytes, [b'\\', b'\n' | b'\r', ..])
+}
+
+/// Whether a field begins with `#`.
+fn has_comment(line: &[u8]) -> bool {
+    let begins = |at: usize| line[at] == b'#' && (at == 0 || is_blank(line[at - 1]));
+    (0..line.len()).any(begins)
 }

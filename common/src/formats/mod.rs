@@ -15,6 +15,7 @@ pub mod obj;
 pub mod opt;
 mod origins;
 pub mod pattern;
+pub mod polygon;
 pub mod read;
 pub mod scene_file;
 

@@ -10,11 +10,11 @@ use super::*;
 
 const SAMPLES: &[&str] = &[
     "# c\np 1 100001000001 3 -0.3 -0.36 0.0003 -0.29 -0.365 0.035 -0.292 -0.365 3.06e-05\n\
-     p 2 100001002001 5 4 0 0 1 1 0 1 0 1 1 2 2 2\n\n",
+     p 2 100001002001 5 4 2 0 1 0.5 0.5 1 0 2 1 0 0 1\n\n",
     "# near infrared\nn 1\ns d 0.25\ne d 0.50   d 0.44 0.45   d 0.46 0.44\n",
     "400.0 0.55667 -0.321394 -0.766044\n0.047259 -0.999941 -0.0 -0.01087\n",
     "-0.4 -0.75\n0.4 0.75\n",
-    "o a\ng b\nusemtl c\nv 0 0 0\nv 1 0 0\nv 0 1 0 1\nvt 1 1\nf 1 2 3\nf -1/1 -2//3 1/2/3\n",
+    "o a\ng b d\nusemtl c # e\nf 1 2 \\\n3\nbevel on\nsurf 1\nv 0 0 0\nv 1 0 0\nv 0 1 0 1\nvt 1 1\nf 1 2 3\nf -1/1 -2//3 1/2/3\n",
     "scene = 'a'\npattern = [0, 0, 1, 1]\n[light.sky]\nkind = 'clear'\nirradiance_W_m2 = { A = 1 }\n\
      [[bands]]\nname = 'A'\n[bands.materials]\nm = { rho = 0.1, tau = 1e-3 }\n[options]\ndiameter = inf\n",
 ];
@@ -37,7 +37,7 @@ fn all_parsers_hold(bytes: &[u8]) {
     for source in checked(light::parse("f", bytes), bytes).unwrap_or_default() {
         assert!(source.irradiance_W_m2.is_finite() && source.irradiance_W_m2 >= 0.0);
         assert!((source.direction.length() - 1.0).abs() < 1e-12);
-        assert!(source.direction.z <= -light::MIN_DESCENT);
+        assert!(source.direction.z <= -crate::light::MIN_DESCENT);
     }
     if let Some(rectangle) = checked(pattern::parse("f", bytes), bytes) {
         assert!((rectangle.max - rectangle.min).min_element() >= pattern::MIN_SIDE);
@@ -54,7 +54,8 @@ fn checked<T>(result: Result<T, FormatError>, bytes: &[u8]) -> Option<T> {
         Ok(value) => return Some(value),
         Err(error) => error,
     };
-    let lines = 1 + bytes.iter().filter(|&&byte| byte == b'\n').count();
+    let ends = bytes.iter().filter(|byte| matches!(byte, b'\n' | b'\r'));
+    let lines = 1 + ends.count();
     let place = error.place();
     assert_eq!(place.file, "f");
     assert!(
@@ -108,6 +109,7 @@ fn damage() -> impl Strategy<Value = Damage> {
         " ",
         "\0",
         "\u{1f}\u{8b}",
+        "\\\n",
         "f",
         "p",
         "[[",

@@ -1,13 +1,15 @@
 //! Wavefront OBJ: faces of numbered vertices. Groups are organs, objects are plants, materials have
-//! names. Texture coordinates, normals, smoothing, lines and points are passed over.
+//! names. Texture coordinates, normals, smoothing, levels of detail, lines and points are passed over; so are curves
+//! and curved surfaces, with a warning.
 
 use std::collections::HashMap;
 
 use glam::DVec3;
 
-use super::error::FormatError;
+use super::error::{FormatError, Place};
 use super::geometry_file::{GeometryFile, numbered, vertex};
 use super::lines::{Fields, Lines};
+use super::polygon::{Cutter, MAX_VERTICES};
 use crate::canopy::{Material, Organ};
 
 /// The name of a group, object or material where the file has none.
@@ -19,18 +21,20 @@ pub const MAX_NAME_BYTES: usize = 255;
 /// Parses an OBJ file (unpacked); `file` is its name in messages.
 pub fn parse(file: &str, bytes: &[u8]) -> Result<GeometryFile, FormatError> {
     let mut mesh = GeometryFile::new(file);
-    let mut vertices = Vec::new();
+    // faces may come before their vertices
+    let vertices = vertices(file, bytes)?;
+    let mut before = 0;
     let mut names = Names::default();
-    let mut polygon = Vec::new();
-    let mut lines = Lines::new(file, bytes);
+    let (mut polygon, mut cutter) = (Vec::new(), Cutter::default());
+    let mut curved = None;
+    let mut lines = Lines::joined(file, bytes);
     while let Some(mut fields) = lines.next()? {
         match fields.required("a statement")? {
-            // what follows x y z is a weight or a colour
-            b"v" => vertices.push(vertex(&mut fields, vertices.len() + 1)?),
-            b"f" => {
-                face(&mut fields, &vertices, &mut polygon)?;
+            b"v" => before += 1,
+            b"f" | b"fo" => {
+                face(&mut fields, &vertices, before, &mut polygon)?;
                 let (organ, material) = names.indices(&mut mesh);
-                mesh.push_polygon(&fields, &polygon, organ, material)?;
+                mesh.push_polygon(&mut cutter, &fields, &polygon, organ, material)?;
             }
             b"o" => {
                 names.object = name(&mut fields)?;
@@ -45,26 +49,96 @@ pub fn parse(file: &str, bytes: &[u8]) -> Result<GeometryFile, FormatError> {
                 names.material = name(&mut fields)?;
                 names.current = None;
             }
-            b"vt" | b"vn" | b"vp" | b"s" | b"mtllib" | b"l" | b"p" => {}
+            other if CURVED.contains(&other) => {
+                curved.get_or_insert_with(|| fields.place());
+            }
+            other if PASSED_OVER.contains(&other) => {}
             other => {
                 return Err(fields.fault("an OBJ statement (v, f, g, o, usemtl, ...)", Some(other)));
             }
         }
     }
+    mesh.warnings.extend(curved.map(passed_over));
     Ok(mesh)
 }
 
+/// Statements that say nothing of triangles. Not among them are `call` and `csh`, which bring in other files.
+const PASSED_OVER: [&[u8]; 29] = [
+    // vertices of other kinds, lines and points
+    b"vt",
+    b"vn",
+    b"vp",
+    b"l",
+    b"p",
+    // how faces look
+    b"s",
+    b"mg",
+    b"bevel",
+    b"c_interp",
+    b"d_interp",
+    b"lod",
+    b"mtllib",
+    b"usemap",
+    b"maplib",
+    b"shadow_obj",
+    b"trace_obj",
+    // what belongs to curves and curved surfaces
+    b"cstype",
+    b"deg",
+    b"bmat",
+    b"step",
+    b"parm",
+    b"trim",
+    b"hole",
+    b"scrv",
+    b"sp",
+    b"end",
+    b"con",
+    b"ctech",
+    b"stech",
+];
+
+/// Curves and curved surfaces, of today and of older versions.
+const CURVED: [&[u8]; 7] = [b"curv", b"curv2", b"surf", b"bsp", b"bzp", b"cdc", b"cdp"];
+
+fn passed_over(place: Place) -> String {
+    format!("curves and curved surfaces are passed over, the first in {place}")
+}
+
+/// All vertices of the file.
+fn vertices(file: &str, bytes: &[u8]) -> Result<Vec<DVec3>, FormatError> {
+    let mut vertices = Vec::new();
+    let mut lines = Lines::joined(file, bytes);
+    while let Some(mut fields) = lines.next()? {
+        if fields.next() == Some(b"v") {
+            // what follows x y z is a weight or a colour
+            vertices.push(vertex(&mut fields, vertices.len() + 1)?);
+        }
+    }
+    Ok(vertices)
+}
+
+/// A name, or several, with one blank between them.
 fn name(fields: &mut Fields<'_>) -> Result<Option<String>, FormatError> {
-    let text = fields.text();
-    if text.is_empty() {
+    let mut name = Vec::new();
+    while let Some(field) = fields.next_of_name() {
+        if !name.is_empty() {
+            name.push(b' ');
+        }
+        name.extend_from_slice(field);
+        if name.len() > MAX_NAME_BYTES {
+            break;
+        }
+    }
+    if name.is_empty() {
         return Ok(None);
     }
-    let name = std::str::from_utf8(text).ok();
-    match name.filter(|name| name.len() <= MAX_NAME_BYTES) {
+    let text = std::str::from_utf8(&name).ok();
+    match text.filter(|name| name.len() <= MAX_NAME_BYTES) {
         Some(name) => Ok(Some(name.to_owned())),
         None => Err(fields.fault(
             format_args!("a name in UTF-8 of at most {MAX_NAME_BYTES} bytes"),
-            Some(text),
+            Some(&name),
         )),
     }
 }
@@ -103,21 +177,28 @@ impl Names {
     }
 }
 
+/// `before` vertices stand before the face in the file.
 fn face(
     fields: &mut Fields<'_>,
     vertices: &[DVec3],
+    before: usize,
     polygon: &mut Vec<DVec3>,
 ) -> Result<(), FormatError> {
     polygon.clear();
     while let Some(field) = fields.next() {
-        let found = resolve(field, vertices).ok_or_else(|| {
-            let known = vertices.len();
-            fields.fault(
-                format_args!("a vertex from 1 to {known}, or from -{known} to -1"),
-                Some(field),
-            )
-        })?;
-        polygon.push(found);
+        let Some(found) = resolve(field, before).and_then(|index| vertices.get(index)) else {
+            let expected = match (vertices.len(), before) {
+                (0, _) => "vertices (v) for the faces of the file".to_owned(),
+                (all, 0) => format!("a vertex from 1 to {all}"),
+                (all, before) => format!("a vertex from 1 to {all}, or from -{before} to -1"),
+            };
+            return Err(fields.fault(expected, Some(field)));
+        };
+        if polygon.len() == MAX_VERTICES {
+            let expected = format_args!("a face of at most {MAX_VERTICES} vertices");
+            return Err(fields.fault(expected, Some(field)));
+        }
+        polygon.push(*found);
     }
     if polygon.len() < 3 {
         return Err(fields.fault("at least 3 vertices", None));
@@ -125,122 +206,19 @@ fn face(
     Ok(())
 }
 
-/// The vertex of `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative numbers count back from the last.
-fn resolve(field: &[u8], vertices: &[DVec3]) -> Option<DVec3> {
+/// The index of the vertex of `v`, `v/vt`, `v//vn` or `v/vt/vn`; negative numbers count back from the last one before
+/// the face.
+fn resolve(field: &[u8], before: usize) -> Option<usize> {
     let number = field.split(|&byte| byte == b'/').next()?;
     let number: i64 = std::str::from_utf8(number).ok()?.parse().ok()?;
-    let index = if number < 0 {
+    if number < 0 {
         let back = usize::try_from(number.unsigned_abs()).ok()?;
-        vertices.len().checked_sub(back)?
+        before.checked_sub(back)
     } else {
-        usize::try_from(number).ok()?.checked_sub(1)?
-    };
-    vertices.get(index).copied()
+        usize::try_from(number).ok()?.checked_sub(1)
+    }
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const SQUARE: &str = "v 0 0 1\nv 1 0 1\nv 1 1 1 0.5 0.5 0.5\nv 0 1 1\n";
-
-    fn parsed(faces: &str) -> Result<GeometryFile, String> {
-        let text = format!("{SQUARE}{faces}");
-        parse("a.obj", text.as_bytes()).map_err(|error| error.to_string())
-    }
-
-    #[test]
-    fn all_ways_to_name_a_vertex_mean_the_same() {
-        let expected = parsed("f 1 2 3 4").unwrap();
-        assert_eq!(expected.mesh.len(), 2);
-        for face in [
-            "f 1/1 2/2 3/3 4/4",
-            "f 1//7 2//7 3//7 4//7",
-            "f 1/1/1 2/1/1 3/1/1 4/1/1",
-            "f -4 -3 -2 -1",
-        ] {
-            assert_eq!(parsed(face).unwrap().mesh, expected.mesh);
-        }
-    }
-
-    #[test]
-    fn groups_are_organs_objects_are_plants_and_materials_have_names() {
-        let faces = "mtllib a.mtl\nvn 0 0 1\ns off\nf 1 2 3\n\
-                     o oak\nusemtl bark\nf 1 2 3\ng leaf one\nusemtl leaf\nf 1 2 3\nf 2 3 4\n\
-                     o elm\nf 1 2 3\ng leaf one\nf 1 2 3\n";
-        let mesh = parsed(faces).unwrap();
-        let organs: Vec<(&str, &str)> = mesh
-            .organs
-            .iter()
-            .map(|organ| (organ.plant.as_str(), organ.id.as_str()))
-            .collect();
-        assert_eq!(
-            organs,
-            [
-                ("default", "default"),
-                ("oak", "oak"),
-                ("oak", "leaf one"),
-                ("elm", "elm"),
-                ("elm", "leaf one")
-            ]
-        );
-        assert_eq!(mesh.mesh.organ, [0, 1, 2, 2, 3, 4]);
-        let names = ["default", "bark", "leaf"];
-        assert_eq!(
-            mesh.materials,
-            names.map(|name| Material::Named(name.into()))
-        );
-        assert_eq!(mesh.mesh.material, [0, 1, 2, 2, 2, 2]);
-    }
-
-    #[test]
-    fn faces_without_their_vertices_are_refused() {
-        for face in [
-            "f 1 2 5",
-            "f 0 1 2",
-            "f -5 1 2",
-            "f 1 2 x",
-            "f 1 2 99999999999999999999",
-        ] {
-            let error = parsed(face).unwrap_err();
-            let expected = "a.obj, line 5: expected a vertex from 1 to 4, or from -4 to -1, found ";
-            assert!(error.starts_with(expected), "{error}");
-        }
-        assert_eq!(
-            parsed("f 1 2\n").unwrap_err(),
-            "a.obj, line 5: expected at least 3 vertices, found the end of the line"
-        );
-    }
-
-    #[test]
-    fn garbled_files_are_refused() {
-        for (text, expected) in [
-            (
-                "v 0 0\n",
-                "line 5: expected z of vertex 5, a finite number, found the end of the line",
-            ),
-            (
-                "v 0 nan 0\n",
-                "line 5: expected y of vertex 5, a finite number, found 'nan'",
-            ),
-            (
-                "<html>\n",
-                "line 5: expected an OBJ statement (v, f, g, o, usemtl, ...), found '<html>'",
-            ),
-        ] {
-            assert_eq!(parsed(text).unwrap_err(), format!("a.obj, {expected}"));
-        }
-        assert!(parse("a.obj", b"o \xff\xfe\n").is_err());
-    }
-
-    #[test]
-    fn long_names_cannot_fill_the_memory() {
-        let name = "x".repeat(256);
-        assert!(
-            parsed(&format!("o {name}\n"))
-                .unwrap_err()
-                .contains("at most 255 bytes")
-        );
-        assert!(parsed(&format!("o {}\nf 1 2 3", &name[1..])).is_ok());
-    }
-}
+#[path = "obj_tests.rs"]
+mod tests;

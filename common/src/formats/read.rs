@@ -1,7 +1,7 @@
 //! Files to bytes: the only place where a format touches the file system.
 
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
@@ -21,15 +21,39 @@ pub const MAX_GZIP_RATIO: u64 = 100;
 const GZIP_RATIO_FROM_BYTES: u64 = 64 << 20;
 
 /// The whole content of a file of at most `limit` bytes. Gzip is recognised by its first bytes,
-/// whatever the file's name; its content is held to `limit` too, and to [`MAX_GZIP_RATIO`].
-pub fn read(path: &Path, limit: u64) -> Result<Vec<u8>, FormatError> {
-    let fault = |source| FormatError::Read {
+/// whatever the file's name; its content is held to `limit` too, and to [`MAX_GZIP_RATIO`]. `expected` says in messages
+/// what kind of file it should be.
+pub fn read(path: &Path, limit: u64, expected: &str) -> Result<Vec<u8>, FormatError> {
+    let fault = |source: io::Error| FormatError::Read {
         file: path.display().to_string(),
-        source,
+        source: match source.kind() {
+            ErrorKind::NotFound => {
+                let found = format!("expected {expected}, found no file of that name");
+                io::Error::new(ErrorKind::NotFound, found)
+            }
+            ErrorKind::IsADirectory => {
+                let found = format!("expected {expected}, found a folder{}", scene_in(path));
+                io::Error::new(ErrorKind::IsADirectory, found)
+            }
+            _ => source,
+        },
     };
     let file = File::open(path).map_err(fault)?;
+    if file.metadata().map_err(fault)?.is_dir() {
+        return Err(fault(ErrorKind::IsADirectory.into()));
+    }
     let stored = up_to(file, limit, "the file").map_err(fault)?;
     gunzip(stored, limit).map_err(fault)
+}
+
+/// A folder that was meant for the scene in it.
+fn scene_in(folder: &Path) -> String {
+    let scene = folder.join("scene.toml");
+    if scene.is_file() {
+        format!("; its scene is {}", scene.display())
+    } else {
+        String::new()
+    }
 }
 
 /// Decompresses what begins as gzip does; gives back anything else as it is.
@@ -49,7 +73,7 @@ fn up_to(source: impl Read, limit: u64, what: &str) -> io::Result<Vec<u8>> {
         .read_to_end(&mut bytes)?;
     if bytes.len() as u64 > limit {
         return Err(io::Error::new(
-            io::ErrorKind::FileTooLarge,
+            ErrorKind::FileTooLarge,
             format!("{what} is larger than {limit} bytes"),
         ));
     }
@@ -81,7 +105,7 @@ mod tests {
         ] {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            assert_eq!(read(&path, 100).unwrap(), b"text");
+            assert_eq!(read(&path, 100, "text").unwrap(), b"text");
         }
     }
 
@@ -89,11 +113,21 @@ mod tests {
     fn files_that_cannot_be_read_are_named() {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("no.can");
-        for path in [missing.as_path(), folder.path()] {
-            let error = read(path, 100).unwrap_err().to_string();
-            let expected = format!("{}: cannot be read: ", path.display());
-            assert!(error.starts_with(&expected), "{error}");
-        }
+        let said = |path: &Path| {
+            let error = read(path, 100, "text").unwrap_err().to_string();
+            let file = format!("{}: cannot be read: ", path.display());
+            error.strip_prefix(&file).unwrap().to_owned()
+        };
+        let expected = "expected text, found no file of that name";
+        assert_eq!(said(&missing), expected);
+        assert_eq!(said(folder.path()), "expected text, found a folder");
+        let scene = folder.path().join("scene.toml");
+        std::fs::write(&scene, "").unwrap();
+        let expected = format!(
+            "expected text, found a folder; its scene is {}",
+            scene.display()
+        );
+        assert_eq!(said(folder.path()), expected);
     }
 
     #[test]
@@ -113,7 +147,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("large");
         std::fs::write(&path, [b'x'; 101]).unwrap();
-        let error = read(&path, 100).unwrap_err().to_string();
+        let error = read(&path, 100, "text").unwrap_err().to_string();
         assert!(
             error.ends_with("the file is larger than 100 bytes"),
             "{error}"

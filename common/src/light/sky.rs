@@ -15,7 +15,7 @@ use rand_pcg::Pcg64;
 use thiserror::Error;
 
 use super::sun::{Sun, SunError};
-use super::{Light, Sky, Source};
+use super::{AN_IRRADIANCE, Light, Sky, Source, is_irradiance};
 
 /// Turn from one direction of the spiral to the next, radians: a full turn over the square of the
 /// golden ratio.
@@ -75,7 +75,7 @@ impl Sky {
     ///
     /// A clear sky without a direct part has no sun, one without a diffuse part has only the sun.
     pub fn light(&self, irradiance_W_m2: Vec<f64>) -> Result<Light, SkyError> {
-        let improper = |e: &&f64| !(e.is_finite() && **e >= 0.0);
+        let improper = |e: &&f64| !is_irradiance(**e);
         if let Some(&value) = irradiance_W_m2.iter().find(improper) {
             return Err(SkyError::Irradiance { value });
         }
@@ -196,7 +196,7 @@ pub enum SkyError {
         value: f64,
     },
     /// Not an irradiance.
-    #[error("irradiance {value} W m-2: expected a finite number, not negative")]
+    #[error("irradiance {value:e} W m-2: expected {AN_IRRADIANCE}")]
     Irradiance {
         /// As given.
         value: f64,

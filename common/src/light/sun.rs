@@ -6,20 +6,22 @@ use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t}
 use thiserror::Error;
 use toml::value::{Datetime, Offset};
 
+use super::MIN_DESCENT;
+
 /// The apparent position of the sun above the horizon.
 ///
 /// Apparent, because light arrives along the refracted ray: standard refraction at sea level
 /// (1013.25 hPa, 15 °C) is included. It lifts the sun by 0.02° at 40° and by 0.5° at the horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
-    /// Above the horizon, degrees, `> 0`.
+    /// Above the horizon, degrees; its sine is [`MIN_DESCENT`] or more.
     pub elevation_deg: f64,
     /// From north, clockwise (east is 90), degrees.
     pub azimuth_deg: f64,
 }
 
 impl Sun {
-    /// The sun at an RFC 3339 time in UTC (`2024-06-21T12:00:00Z`; seconds and `Z` may be left out),
+    /// The sun at an RFC 3339 time in UTC (`2024-06-21T12:00:00Z` or `+00:00`; seconds and offset may be left out),
     /// at a latitude (north positive) and a longitude (east positive) in degrees.
     ///
     /// Computed with the Solar Position Algorithm (Reda & Andreas 2003, Solar Energy 76:577-589),
@@ -43,18 +45,19 @@ impl Sun {
                 Some(RefractionCorrection::standard()),
             )
             .map_err(refused)?;
-        if !position.is_sun_up() {
-            return Err(SunError::BelowHorizon {
+        let sun = Self {
+            elevation_deg: position.elevation_angle(),
+            azimuth_deg: position.azimuth(),
+        };
+        if sun.towards().z < MIN_DESCENT {
+            return Err(SunError::TooLow {
                 time_utc: time_utc.to_owned(),
                 latitude_deg,
                 longitude_deg,
-                elevation_deg: position.elevation_angle(),
+                elevation_deg: sun.elevation_deg,
             });
         }
-        Ok(Self {
-            elevation_deg: position.elevation_angle(),
-            azimuth_deg: position.azimuth(),
-        })
+        Ok(sun)
     }
 
     /// Unit vector towards the sun, x east, y north, z up.
@@ -74,7 +77,8 @@ fn julian_date(time_utc: &str) -> Result<JulianDate, SunError> {
         return Err(bad_time());
     };
     // a local time in a field that is named UTC is more likely a mistake than a wish
-    if !matches!(parsed.offset, None | Some(Offset::Z)) {
+    let utc = [None, Some(Offset::Z), Some(Offset::Custom { minutes: 0 })];
+    if !utc.contains(&parsed.offset) {
         return Err(SunError::NotUtc {
             given: time_utc.to_owned(),
         });
@@ -107,7 +111,7 @@ pub enum SunError {
         given: String,
     },
     /// A time with an offset from UTC.
-    #[error("time '{given}': expected UTC, without an offset")]
+    #[error("time '{given}': expected UTC, which ends in Z, in +00:00 or in nothing")]
     NotUtc {
         /// As given.
         given: String,
@@ -124,21 +128,33 @@ pub enum SunError {
         /// What the solar position algorithm said.
         source: solar_positioning::Error,
     },
-    /// It is night.
-    #[error(
-        "the sun is below the horizon at {time_utc}, latitude {latitude_deg}, longitude \
-         {longitude_deg}: its elevation is {elevation_deg:.2} degrees"
-    )]
-    BelowHorizon {
+    /// It is night, or the moment of sunrise or sunset.
+    #[error("{}", too_low(time_utc, *latitude_deg, *longitude_deg, *elevation_deg))]
+    TooLow {
         /// As given.
         time_utc: String,
         /// As given.
         latitude_deg: f64,
         /// As given.
         longitude_deg: f64,
-        /// Of the sun, at most 0.
+        /// Of the sun, less than [`MIN_DESCENT`] wants.
         elevation_deg: f64,
     },
+}
+
+fn too_low(time_utc: &str, latitude_deg: f64, longitude_deg: f64, elevation_deg: f64) -> String {
+    let where_and_when =
+        format!("at {time_utc}, latitude {latitude_deg}, longitude {longitude_deg}");
+    if elevation_deg < 0.0 {
+        format!(
+            "the sun is below the horizon {where_and_when}: its elevation is {elevation_deg:.4} degrees"
+        )
+    } else {
+        format!(
+            "the sun is on the horizon {where_and_when}: its elevation is {elevation_deg:.4} degrees, expected 0.0058 \
+             or more"
+        )
+    }
 }
 
 #[cfg(test)]
@@ -175,6 +191,47 @@ mod tests {
             .to_string();
         for part in ["2024-06-21T00:00:00Z", "43.6", "3.9", "-22.", "below"] {
             assert!(error.contains(part), "{error}");
+        }
+    }
+
+    #[test]
+    fn fault_a_sun_on_the_horizon_was_a_beam_without_bounds() {
+        // sunrise, by the second: no sun is taken that a .light file could not have
+        let mut first = None;
+        for second in 0..1200 {
+            let (minute, second) = (35 + second / 60, second % 60);
+            let time = format!("2024-03-20T05:{minute:02}:{second:02}Z");
+            match Sun::at(&time, 43.6, 3.9) {
+                Ok(sun) => {
+                    assert!(sun.towards().z >= MIN_DESCENT);
+                    first = first.or(Some(sun.elevation_deg));
+                }
+                Err(error) => {
+                    assert!(first.is_none(), "{error}");
+                    let error = error.to_string();
+                    let horizon = ["is on the horizon", "is below the horizon"];
+                    assert!(horizon.iter().any(|h| error.contains(h)), "{error}");
+                    assert!(!error.contains("-0.0000"), "{error}");
+                }
+            }
+        }
+        assert!(first.is_some_and(|elevation| elevation < 0.01), "{first:?}");
+        let error = too_low("t", 1.0, 2.0, 0.001);
+        let expected = "the sun is on the horizon at t, latitude 1, longitude 2: its elevation is 0.0010 degrees, \
+                        expected 0.0058 or more";
+        assert_eq!(error, expected);
+    }
+
+    #[test]
+    fn fault_utc_written_as_an_offset_of_nothing_was_refused() {
+        let expected = Sun::at("2024-06-21T12:00:00Z", 43.6, 3.9).unwrap();
+        for time in [
+            "2024-06-21T12:00:00+00:00",
+            "2024-06-21 12:00:00-00:00",
+            "2024-06-21t12:00z",
+            " 2024-06-21T12:00+00:00 ",
+        ] {
+            assert_eq!(Sun::at(time, 43.6, 3.9).unwrap(), expected, "{time}");
         }
     }
 

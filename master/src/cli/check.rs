@@ -2,19 +2,20 @@
 
 use anyhow::Result;
 use clap::Args;
-use nestrad_common::assemble;
-use nestrad_common::inspection::{Inspection, MaterialFacts};
+use nestrad_common::assemble::{Examined, examine};
+use nestrad_common::canopy::Canopy;
+use nestrad_common::inspection::{Inspection, MaterialFacts, SunFacts};
 use nestrad_common::light::{Light, SkyLight};
-use nestrad_common::optics::FaceOptics;
+use nestrad_common::optics::{FaceOptics, Optics};
 use nestrad_common::options::Options;
-use nestrad_common::scene::Scene;
 
-use super::console;
+use super::console::{self, Notes};
 use super::flags::SceneFlags;
 
 /// Say what is in a scene and what is wrong with it; compute nothing
 ///
-/// Facts and warnings go to stdout. The exit code is 1 where `solve` would refuse the scene.
+/// Needs geometry; optics and light are checked where they are given. Facts and warnings go to stdout. The exit code
+/// is 1 where `solve` would refuse what is given.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
     #[command(flatten)]
@@ -24,26 +25,40 @@ pub(crate) struct CheckArgs {
 impl CheckArgs {
     pub(crate) fn run(self) -> Result<()> {
         let inputs = self.scene.inputs(Options::default())?;
-        match assemble::load(&inputs) {
-            Ok(loaded) => {
-                let mut facts = Facts::default();
-                facts.geometry(&loaded.inspection);
-                facts.optics(&loaded.scene);
-                facts.light(&loaded.scene);
-                facts.warnings(&loaded.inspection);
-                console::print(facts.0.as_bytes())
-            }
-            Err(error) => {
-                // the geometry may be good even where its optics or its light are not
-                if let Ok(inspection) = assemble::inspect_geometry(&inputs) {
-                    let mut facts = Facts::default();
-                    facts.geometry(&inspection);
-                    facts.warnings(&inspection);
-                    console::print(facts.0.as_bytes())?;
-                }
-                Err(error.into())
-            }
+        let Examined {
+            canopy,
+            optics,
+            light,
+            light_bands,
+            mut faults,
+        } = examine(&inputs);
+        let mut facts = Facts::default();
+        if let Some((_, inspection)) = &canopy {
+            facts.geometry(inspection);
         }
+        match (&canopy, &optics) {
+            (Some((canopy, _)), Some(optics)) => facts.optics(canopy, optics),
+            _ if inputs.bands.is_empty() => facts.line("band", "none is given, which solve needs"),
+            _ => {}
+        }
+        match &light {
+            Some(light) => facts.light(light, &light_bands),
+            None if inputs.light.is_none() => {
+                facts.line("light", "none is given, which solve needs")
+            }
+            None => {}
+        }
+        if let Some((_, inspection)) = &canopy {
+            facts.warnings(inspection);
+            console::print(facts.0.as_bytes())?;
+        }
+        let Some(last) = faults.pop() else {
+            return Ok(());
+        };
+        for fault in faults {
+            Notes { quiet: false }.say("error", &fault.to_string());
+        }
+        Err(last.into())
     }
 }
 
@@ -106,14 +121,14 @@ impl Facts {
         }
     }
 
-    fn optics(&mut self, scene: &Scene) {
-        for band in &scene.optics.bands {
+    fn optics(&mut self, canopy: &Canopy, optics: &Optics) {
+        for band in &optics.bands {
             let face = |f: FaceOptics| format!("rho {} tau {}", f.rho, f.tau);
             let mut parts = Vec::new();
-            if scene.canopy.soil_z_m.is_some() {
+            if canopy.soil_z_m.is_some() {
                 parts.push(format!("soil rho {}", band.soil_albedo));
             }
-            for (material, optics) in scene.canopy.materials.iter().zip(&band.materials) {
+            for (material, optics) in canopy.materials.iter().zip(&band.materials) {
                 let (upper, lower) = (face(optics.upper), face(optics.lower));
                 parts.push(if upper == lower {
                     format!("{material} {upper}")
@@ -125,15 +140,17 @@ impl Facts {
         }
     }
 
-    fn light(&mut self, scene: &Scene) {
-        let Light { suns, sky } = &*scene.light;
+    fn light(&mut self, light: &Light, bands: &[String]) {
+        let Light { suns, sky } = light;
         let sum = |band: usize| {
             let of_sky = |sky: &SkyLight| sky.diffuse_fraction * sky.irradiance_W_m2[band];
             let of_suns: f64 = suns.iter().map(|s| s.irradiance_W_m2[band]).sum();
             of_suns + sky.as_ref().map_or(0.0, of_sky)
         };
-        let totals = (0..).zip(&scene.optics.bands);
-        let totals = totals.map(|(b, band)| format!("{} {:.2} W m⁻²", band.name, sum(b)));
+        let totals = bands.iter().enumerate().map(|(b, name)| {
+            let name = if name.is_empty() { "every band" } else { name };
+            format!("{name} {:.2} W m⁻²", sum(b))
+        });
         let totals = totals.collect::<Vec<_>>().join(", ");
         let s = if suns.len() == 1 { "" } else { "s" };
         let what = match (suns.len(), sky) {
@@ -142,6 +159,17 @@ impl Facts {
             (n, None) => format!("{n} source{s}"),
         };
         self.line("light", &format!("{what}: {totals}"));
+        let heights = suns.iter().map(|sun| sun.elevation_deg());
+        let lowest = heights.clone().fold(f64::INFINITY, f64::min);
+        let highest = heights.fold(0.0, f64::max);
+        match SunFacts::of(suns) {
+            Some(sun) => self.line("sun", &sun.to_string()),
+            None if suns.is_empty() => {}
+            None => {
+                let range = format!("{lowest:.2} to {highest:.2} degrees above the horizon");
+                self.line("sources", &range);
+            }
+        }
     }
 
     fn warnings(&mut self, facts: &Inspection) {

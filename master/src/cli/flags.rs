@@ -9,7 +9,9 @@ use clap::{Args, ValueEnum};
 use nestrad_common::assemble;
 use nestrad_common::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
 use nestrad_common::light::Sky;
-use nestrad_common::options::{Options, Unit};
+use nestrad_common::options::{Options, Unit, Up};
+
+use super::numbers::number;
 
 /// The canopy, its optics and its light. What is said here wins over what a scene file says.
 #[derive(Debug, Args)]
@@ -49,7 +51,7 @@ pub(crate) struct SceneFlags {
     #[arg(long, value_name = "NAME=W_m2", value_parser = named_number, requires = "sky")]
     irradiance: Vec<(String, f64)>,
 
-    /// Clear sky: date and time in UTC, such as 2024-06-21T10:00:00Z
+    /// Clear sky: date and time in UTC, such as 2024-06-21T10:00:00Z (or +00:00)
     #[arg(
         long,
         value_name = "UTC",
@@ -64,6 +66,7 @@ pub(crate) struct SceneFlags {
         value_name = "DEGREES",
         requires = "sky",
         required_if_eq("sky", "clear"),
+        value_parser = number,
         allow_negative_numbers = true
     )]
     latitude: Option<f64>,
@@ -74,6 +77,7 @@ pub(crate) struct SceneFlags {
         value_name = "DEGREES",
         requires = "sky",
         required_if_eq("sky", "clear"),
+        value_parser = number,
         allow_negative_numbers = true
     )]
     longitude: Option<f64>,
@@ -83,7 +87,9 @@ pub(crate) struct SceneFlags {
         long,
         value_name = "PART",
         requires = "sky",
-        required_if_eq("sky", "clear")
+        required_if_eq("sky", "clear"),
+        value_parser = number,
+        allow_negative_numbers = true
     )]
     diffuse_fraction: Option<f64>,
 
@@ -92,20 +98,27 @@ pub(crate) struct SceneFlags {
     pattern: Option<PathBuf>,
 
     /// Height of a horizontal soil plane, in --unit [default: no soil, a black void below]
-    #[arg(long, value_name = "Z", allow_negative_numbers = true)]
+    #[arg(long, value_name = "Z", value_parser = number, allow_negative_numbers = true)]
     soil: Option<f64>,
 
     /// Unit of length of geometry, pattern and --soil: m, cm or mm; results are in m [default: m]
     #[arg(long)]
     unit: Option<Unit>,
+
+    /// The axis of the geometry files that points up: y or z. With y, a file's x stays, its y becomes z and its z
+    /// becomes -y; pattern, --soil and light have z up always [default: z]
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Up>,
 }
 
 /// A built-in sky.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum SkyKind {
     /// The same radiance from everywhere
+    #[value(alias = "uniform_overcast")]
     UniformOvercast,
     /// Moon and Spencer: the zenith three times as bright as the horizon
+    #[value(alias = "standard_overcast")]
     StandardOvercast,
     /// CIE clear sky and the sun, at --time, --latitude and --longitude
     Clear,
@@ -114,7 +127,7 @@ enum SkyKind {
 impl SceneFlags {
     /// Flags over the scene file, if there is one.
     pub(crate) fn inputs(self, options: Options) -> Result<Inputs> {
-        let is_toml = |path: &PathBuf| path.extension().is_some_and(|e| e == "toml");
+        let is_toml = |path: &PathBuf| assemble::is_scene_file(path);
         let (files, scenes): (Vec<_>, Vec<_>) = self.scenes.iter().cloned().partition(is_toml);
         let file = match &files[..] {
             [] => Inputs::default(),
@@ -129,6 +142,7 @@ impl SceneFlags {
         let flags = Inputs {
             scenes,
             unit: self.unit,
+            up: self.up,
             pattern: self.pattern.clone().map(PatternInput::File),
             soil: self.soil,
             // said in a scene file alone
@@ -230,11 +244,4 @@ fn named_number(text: &str) -> Result<(String, f64), String> {
         Ok(number) => Ok((name, number)),
         Err(_) => Err(format!("expected a number, found {number}")),
     }
-}
-
-/// A finite number above 0.
-pub(super) fn positive(text: &str) -> Result<f64, String> {
-    let number = text.parse().ok();
-    let number = number.filter(|value: &f64| value.is_finite() && *value > 0.0);
-    number.ok_or_else(|| "expected a number above 0".to_owned())
 }

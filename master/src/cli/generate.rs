@@ -11,6 +11,7 @@ use nestrad_common::generate::{
 };
 
 use super::console;
+use super::numbers::{number, whole};
 
 /// Write a made-up canopy, with optics, light and a scene file, for `nestrad solve DIR/scene.toml`
 ///
@@ -39,7 +40,7 @@ struct Place {
     out: PathBuf,
 
     /// Another seed, other plants
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: u64,
 }
 
@@ -50,16 +51,16 @@ struct PlantFlags {
     rows: Pair<u32>,
 
     /// From row to row, metres [default: maize 0.75, bean 0.5]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     row_spacing: Option<f64>,
 
     /// From plant to plant in a row, metres [default: maize 0.2, bean 0.1]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     plant_spacing: Option<f64>,
 
     /// Mean area of the triangles that leaves consist of, m2, 1e-7 to 1e-2
     /// [default: maize 8e-5, bean 5e-5]
-    #[arg(long, value_name = "M2")]
+    #[arg(long, value_name = "M2", value_parser = number, allow_negative_numbers = true)]
     leaf_triangle: Option<f64>,
 
     #[command(flatten)]
@@ -69,7 +70,7 @@ struct PlantFlags {
 #[derive(Debug, Args)]
 struct RandomFlags {
     /// Leaf area index: one-sided leaf area per area of ground
-    #[arg(long, default_value_t = 3.0)]
+    #[arg(long, default_value_t = 3.0, value_parser = number, allow_negative_numbers = true)]
     lai: f64,
 
     /// Leaf angles: spherical, uniform, planophile, erectophile, plagiophile, extremophile,
@@ -78,7 +79,7 @@ struct RandomFlags {
     angles: LeafAngles,
 
     /// Area of a leaf, m2; adjusted so that a whole number of leaves gives --lai
-    #[arg(long, value_name = "M2", default_value_t = 4e-4)]
+    #[arg(long, value_name = "M2", default_value_t = 4e-4, value_parser = number, allow_negative_numbers = true)]
     leaf_area: f64,
 
     /// Outline of the leaves
@@ -90,7 +91,7 @@ struct RandomFlags {
     size: Pair<f64>,
 
     /// Height of the layer, metres; at least the length of a leaf
-    #[arg(long, value_name = "METRES", default_value_t = 1.0)]
+    #[arg(long, value_name = "METRES", default_value_t = 1.0, value_parser = number, allow_negative_numbers = true)]
     height: f64,
 
     #[command(flatten)]

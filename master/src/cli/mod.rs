@@ -5,6 +5,7 @@ mod check;
 mod console;
 mod flags;
 mod generate;
+mod numbers;
 mod record;
 mod remote;
 mod report;

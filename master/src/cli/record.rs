@@ -2,7 +2,7 @@
 
 use nestrad_common::inputs::{Inputs, LightInput, PatternInput};
 use nestrad_common::light::Sky;
-use nestrad_common::options::{Diameter, TableFormat, Unit};
+use nestrad_common::options::{Diameter, TableFormat, Unit, Up};
 use nestrad_engine::plan::{Estimator, Settings};
 use serde::Serialize;
 
@@ -11,6 +11,7 @@ use serde::Serialize;
 pub(crate) struct OptionsRecord {
     scenes: Vec<String>,
     unit: Unit,
+    up: Up,
     pattern: Option<String>,
     /// In `unit`.
     soil: Option<f64>,
@@ -52,6 +53,7 @@ impl OptionsRecord {
                 .map(|p| p.display().to_string())
                 .collect(),
             unit: inputs.unit.unwrap_or_default(),
+            up: inputs.up.unwrap_or_default(),
             pattern: inputs.pattern.as_ref().map(|pattern| match pattern {
                 PatternInput::File(path) => path.display().to_string(),
                 PatternInput::Corners(corners) => corners.map(|c| c.to_string()).join(" "),

@@ -9,6 +9,7 @@ use nestrad_common::inputs::Inputs;
 use nestrad_results::report::{self, PictureRequest, Request};
 
 use super::console::Notes;
+use super::numbers::whole;
 
 /// Turn the results of `solve` into one HTML page: the canopy in 3D, profiles, balance, errors
 ///
@@ -27,7 +28,7 @@ pub(crate) struct ReportArgs {
 
     /// Draw at most so many triangles; a page takes about 60 bytes for each. A larger canopy gets the
     /// page without the drawing
-    #[arg(long, value_name = "N", default_value_t = 2_000_000)]
+    #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = whole::<usize>(0..=u64::MAX), allow_negative_numbers = true)]
     most_triangles: usize,
 
     /// Write a picture of the canopy too, as PNG, for print

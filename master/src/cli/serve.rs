@@ -12,7 +12,7 @@ use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 use tracing_subscriber::EnvFilter;
 
-use super::flags::positive;
+use super::numbers::{positive, whole};
 use super::state::StateFlags;
 use super::workers::lease;
 
@@ -53,15 +53,15 @@ pub(crate) struct ServeArgs {
 #[command(next_help_heading = "Limits")]
 struct LimitFlags {
     /// Threads to compute with, 0 for one per processor
-    #[arg(long, value_name = "N", default_value_t = 0)]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u16>(0..=65_535), allow_negative_numbers = true)]
     threads: u16,
 
     /// Solves that are computed at a time
-    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u8).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u8>(1..=255), allow_negative_numbers = true)]
     solves: u8,
 
     /// Solves that may wait
-    #[arg(long, value_name = "N", default_value_t = 1000)]
+    #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole::<u32>(0..=u32::MAX.into()), allow_negative_numbers = true)]
     queue: u32,
 
     /// Memory that one solve may take, GiB
@@ -77,7 +77,7 @@ struct LimitFlags {
     result_memory: f64,
 
     /// Time for solves to end when the master is told to stop; then they are cancelled
-    #[arg(long, value_name = "SECONDS", default_value_t = 30)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 30, value_parser = whole::<u32>(0..=u32::MAX.into()), allow_negative_numbers = true)]
     drain: u32,
 }
 

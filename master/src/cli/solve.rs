@@ -4,7 +4,6 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use anyhow::{Context, Result};
-use clap::builder::RangedU64ValueParser;
 use clap::{Args, ValueEnum};
 use nestrad_cluster::with_rows;
 use nestrad_common::assemble::{self, Loaded};
@@ -27,7 +26,8 @@ use serde::Deserialize;
 
 use super::bar::Bar;
 use super::console::{self, Notes};
-use super::flags::{SceneFlags, positive};
+use super::flags::SceneFlags;
+use super::numbers::{positive, whole};
 use super::record::OptionsRecord;
 use super::remote::MasterFlags;
 use super::state::StateFlags;
@@ -89,11 +89,11 @@ struct HowFlags {
     memory: Option<f64>,
 
     /// Threads to compute with, 0 for one per processor; results do not depend on it [default: 0]
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(0..=4096))]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=4096), allow_negative_numbers = true)]
     threads: Option<usize>,
 
     /// Start of all random numbers; the same seed gives the same results to the last bit [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: Option<u64>,
 
     /// How light between leaves is sampled

@@ -6,7 +6,7 @@ use anyhow::Result;
 use clap::Args;
 use nestrad_cluster::store::Store;
 
-use super::flags::positive;
+use super::numbers::positive;
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "What is kept")]

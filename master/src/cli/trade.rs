@@ -5,7 +5,6 @@ use std::sync::Arc;
 
 use anyhow::{Context, Result};
 use clap::Args;
-use clap::builder::RangedU64ValueParser;
 use nestrad_common::assemble;
 use nestrad_common::inputs::Inputs;
 use nestrad_common::options::Options;
@@ -23,7 +22,8 @@ use rayon::ThreadPoolBuilder;
 
 use super::bar::Bar;
 use super::console::{self, Notes};
-use super::flags::{SceneFlags, positive};
+use super::flags::SceneFlags;
+use super::numbers::{positive, whole};
 
 /// Try settings of `solve` on a scene, and say which is the fastest for an error
 ///
@@ -49,7 +49,7 @@ struct HowFlags {
 
     /// Runs of each setting, each with its own seed, at least 2: their scatter is in the error bars
     #[arg(long, value_name = "N", default_value_t = 3)]
-    #[arg(value_parser = RangedU64ValueParser::<u32>::new().range(2..=1000))]
+    #[arg(value_parser = whole::<u32>(2..=1000), allow_negative_numbers = true)]
     seeds: u32,
 
     /// Smallest error that a setting is wanted for, percent: rms over organs, relative to the mean
@@ -64,11 +64,11 @@ struct HowFlags {
     memory: Option<f64>,
 
     /// Threads to compute with, 0 for one per processor [default: 0]
-    #[arg(long, value_name = "N", value_parser = RangedU64ValueParser::<usize>::new().range(0..=4096))]
+    #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=4096), allow_negative_numbers = true)]
     threads: Option<usize>,
 
     /// Seed of the first run of each setting; the others follow it [default: 1]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: Option<u64>,
 
     /// Say nothing but errors: no progress, no table

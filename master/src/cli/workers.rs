@@ -5,13 +5,13 @@ use std::time::Duration;
 
 use anyhow::Result;
 use clap::Args;
-use clap::builder::RangedU64ValueParser;
 use nestrad_cluster::door::Door;
 use nestrad_cluster::local::{LocalWorkers, Share};
 use nestrad_cluster::{Cluster, WorkerLimits};
 use nestrad_proto::access::Access;
 
 use super::console::Notes;
+use super::numbers::whole;
 
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Who computes it")]
@@ -19,7 +19,7 @@ pub(crate) struct WorkersFlags {
     /// Start so many worker processes on this machine; they share the threads and, besides what this
     /// process takes, the memory
     #[arg(long, value_name = "N", conflicts_with = "listen",
-          value_parser = RangedU64ValueParser::<u32>::new().range(1..=1024))]
+          value_parser = whole::<u32>(1..=1024), allow_negative_numbers = true)]
     workers: Option<u32>,
 
     /// Let workers join this solve: `nestrad-worker --master http://ADDRESS`, any number at any time

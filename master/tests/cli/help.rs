@@ -2,7 +2,7 @@
 
 use super::desk::Desk;
 
-const SCENE: [&str; 12] = [
+const SCENE: [&str; 13] = [
     "<SCENE>",
     "--optics <NAME=FILE>",
     "--light <FILE|NAME=FILE>",
@@ -15,6 +15,7 @@ const SCENE: [&str; 12] = [
     "--pattern <FILE>",
     "--soil <Z>",
     "--unit <UNIT>",
+    "--up <AXIS>",
 ];
 
 const SOLVE: [&str; 12] = [

@@ -6,6 +6,7 @@ mod checks;
 mod desk;
 mod generated;
 mod help;
+mod inputs;
 mod kinds;
 mod refusals;
 mod results;

@@ -45,6 +45,7 @@ pub(super) fn inputs(
     Ok(Inputs {
         scenes,
         unit: file.unit,
+        up: file.up,
         pattern: pattern.transpose()?,
         soil: file.soil.map(Spanned::into_inner),
         kinds: kinds.transpose()?.unwrap_or_default(),

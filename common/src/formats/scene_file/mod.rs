@@ -3,6 +3,7 @@
 //! ```toml
 //! scene = "maize.can.gz"              # or a list of files
 //! unit = "m"                          # of geometry, pattern and soil
+//! up = "z"                            # or "y": the axis of the geometry files that points up
 //! pattern = "maize.8"                 # or [x0, y0, x1, y1]
 //! soil = -0.002
 //! light = "clear.light"
@@ -32,10 +33,12 @@
 //! `longitude_deg`, `diffuse_fraction`. Paths are relative to the scene file.
 
 mod checks;
+mod hints;
 mod tables;
 #[cfg(test)]
 mod tests;
 
+use std::borrow::Cow;
 use std::fmt::Display;
 use std::ops::Range;
 use std::path::Path;
@@ -47,14 +50,30 @@ use crate::inputs::Inputs;
 
 /// Parses a scene file; `file` is its name in messages, `folder` what its paths are relative to.
 pub fn parse(file: &str, bytes: &[u8], folder: &Path) -> Result<Inputs, FormatError> {
-    let text = Text::new(file, bytes)?;
-    let raw: SceneFile = toml::from_str(text.text).map_err(|error| FormatError::Scene {
-        place: error
-            .span()
-            .map_or_else(|| Place::file(file), |span| text.place(&span)),
-        message: error.message().replace('\n', ", "),
+    let bytes = with_line_feeds(bytes);
+    let text = Text::new(file, &bytes)?;
+    let raw: SceneFile = toml::from_str(text.text).map_err(|error| {
+        let span = error.span();
+        let place = span.as_ref().map(|span| text.place(span));
+        FormatError::Scene {
+            place: place.unwrap_or_else(|| Place::file(file)),
+            message: hints::message(error.message(), text.text, span.as_ref()),
+        }
     })?;
     checks::inputs(raw, &text, folder)
+}
+
+/// TOML knows no carriage return that ends a line by itself; other files of ours do.
+fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
+    let lone = |at: &usize| bytes[*at] == b'\r' && bytes.get(at + 1) != Some(&b'\n');
+    if !(0..bytes.len()).any(|at| lone(&at)) {
+        return bytes.into();
+    }
+    let mut ended = bytes.to_vec();
+    for at in (0..bytes.len()).filter(lone) {
+        ended[at] = b'\n';
+    }
+    ended.into()
 }
 
 /// The text, to turn positions into line numbers.

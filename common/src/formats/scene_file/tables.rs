@@ -10,13 +10,14 @@ use serde::de::{self, Deserializer, MapAccess, Visitor};
 use toml::Spanned;
 
 use crate::canopy::Kind;
-use crate::options::{Options, Unit};
+use crate::options::{Options, Unit, Up};
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SceneFile {
     pub(super) scene: Option<OneOrMany>,
     pub(super) unit: Option<Unit>,
+    pub(super) up: Option<Up>,
     pub(super) pattern: Option<Spanned<PatternText>>,
     pub(super) soil: Option<Spanned<f64>>,
     pub(super) kinds: Option<Spanned<KindsTable>>,
@@ -118,7 +119,9 @@ pub(super) struct LightTable {
 #[derive(Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub(super) enum SkyKind {
+    #[serde(alias = "uniform-overcast")]
     UniformOvercast,
+    #[serde(alias = "standard-overcast")]
     StandardOvercast,
     Clear,
 }

@@ -4,11 +4,12 @@ use super::*;
 use crate::inputs::{LightInput, PatternInput};
 use crate::light::Sky;
 use crate::optics::LeafOptics;
-use crate::options::{Diameter, TableFormat, Unit};
+use crate::options::{Diameter, TableFormat, Unit, Up};
 
 const WHOLE: &str = r#"
 scene = ["maize.can.gz", "/abs/soil.obj"]
 unit = "cm"
+up = "y"
 pattern = [-40, -75, 40, 75.5]
 soil = -0.2
 light = "clear.light"
@@ -50,6 +51,7 @@ fn everything_can_be_said() {
     let paths: Vec<_> = inputs.scenes.iter().map(|path| path.to_str()).collect();
     assert_eq!(paths, [Some("dir/maize.can.gz"), Some("/abs/soil.obj")]);
     assert_eq!(inputs.unit, Some(Unit::Centimetre));
+    assert_eq!(inputs.up, Some(Up::Y));
     let corners = PatternInput::Corners([-40.0, -75.0, 40.0, 75.5]);
     assert_eq!(inputs.pattern, Some(corners));
     assert_eq!(inputs.soil, Some(-0.2));
@@ -61,7 +63,7 @@ fn everything_can_be_said() {
     assert_eq!(inputs.bands[1].soil_albedo, Some(0.25));
     assert_eq!(inputs.bands[1].materials["bark"], LeafOptics::opaque(0.4));
     assert_eq!(inputs.bands[1].materials["leaf"].lower.tau, 0.44);
-    assert_eq!(inputs.bands[1].place, Some(Place::line("a.toml", 12)));
+    assert_eq!(inputs.bands[1].place, Some(Place::line("a.toml", 13)));
     let options = inputs.options;
     assert_eq!(options.diameter, Some(Diameter::Metres(0.4)));
     assert_eq!(options.accuracy_percent, Some(0.5));
@@ -155,6 +157,10 @@ fn what_is_wrong_is_named_with_its_line() {
             "a.toml, line 2: unknown variant `inch`",
         ),
         (
+            "up = 'x'\n",
+            "a.toml, line 1: unknown variant `x`, expected `z` or `y`",
+        ),
+        (
             "\n\nsoil = nan\n",
             "a.toml, line 3: expected a finite soil height, found NaN",
         ),
@@ -237,6 +243,123 @@ fn what_is_wrong_is_named_with_its_line() {
         assert!(error.starts_with(expected), "{error}");
         assert!(!error.contains('\n'));
     }
+}
+
+#[test]
+fn fault_numbers_and_texts_that_toml_has_no_form_for_were_not_explained() {
+    for (line, expected) in [
+        (
+            "soil = .1",
+            "expected a number as TOML has it, 0.1, found .1",
+        ),
+        (
+            "soil = -.5e-3 # m",
+            "expected a number as TOML has it, -0.5e-3, found -.5e-3",
+        ),
+        (
+            "soil = 1.",
+            "expected a number as TOML has it, 1.0, found 1.",
+        ),
+        (
+            "soil = +2.e3",
+            "expected a number as TOML has it, +2.0e3, found +2.e3",
+        ),
+        (
+            "soil = 01.5",
+            "expected a number as TOML has it, 1.5, found 01.5",
+        ),
+        (
+            "soil = 0,5",
+            "expected a number as TOML has it, 0.5, found 0,5",
+        ),
+        (
+            "pattern = [0, .5, 1, 1]",
+            "expected a number as TOML has it, 0.5, found .5",
+        ),
+        (
+            "bands = [{ name = 'A', materials = { m = { rho = .1, tau = 0.2 } } }]",
+            "expected a number as TOML has it, 0.1, found .1",
+        ),
+        ("unit = cm", "expected text in quotes, \"cm\", found cm"),
+        (
+            "scene = a.can",
+            "expected text in quotes, \"a.can\", found a.can",
+        ),
+        (
+            "options = { vtp = True }",
+            "expected true, in small letters, found True",
+        ),
+        (
+            "leaf one = 1",
+            "expected a name with blanks in quotes, \"leaf one\", found leaf one",
+        ),
+        (
+            "scene = \"C:\\users\\a.can\"",
+            "expected a path with / or in single quotes, found a \\, which has a meaning of its own in \"\"",
+        ),
+        (
+            "soil = '0.1'",
+            "invalid type: string \"0.1\", expected a number",
+        ),
+        (
+            "options = { threads = 3.5 }",
+            "invalid type: floating point `3.5`, expected a whole number, 0 or more",
+        ),
+    ] {
+        assert_eq!(
+            refusal(&format!("\n{line}\n")),
+            format!("a.toml, line 2: {expected}")
+        );
+    }
+}
+
+#[test]
+fn fault_a_lone_carriage_return_did_not_end_a_line() {
+    for end in ["\r", "\r\n"] {
+        assert_eq!(parsed(&WHOLE.replace('\n', end)), parsed(WHOLE));
+        let error = refusal(&format!("# a{end}{end}soil = nan{end}"));
+        assert!(error.starts_with("a.toml, line 3: "), "{error}");
+    }
+    assert_eq!(parsed("\u{feff}soil = 1\n").soil, Some(1.0));
+}
+
+#[test]
+fn fault_overcast_skies_had_another_name_here_than_in_flags() {
+    for (names, sky) in [
+        (
+            ["uniform_overcast", "uniform-overcast"],
+            Sky::UniformOvercast,
+        ),
+        (
+            ["standard_overcast", "standard-overcast"],
+            Sky::StandardOvercast,
+        ),
+    ] {
+        for name in names {
+            let text = format!("[light.sky]\nkind = '{name}'\nirradiance_W_m2 = {{ PAR = 1 }}\n");
+            let light = parsed(&text).light;
+            assert!(matches!(light, Some(LightInput::Sky { sky: found, .. }) if found == sky));
+        }
+    }
+}
+
+#[test]
+fn a_sun_below_the_horizon_is_named_with_its_line() {
+    let text = "soil = 0\n[light.sky]\nkind = 'clear'\ntime_utc = 2024-06-21T00:00:00Z\nlatitude_deg = 43.6\n\
+                longitude_deg = 3.9\ndiffuse_fraction = 0.2\nirradiance_W_m2 = { PAR = 400 }\n";
+    let error = refusal(text);
+    assert!(
+        error.starts_with("a.toml, line 2: the sun is below the horizon at 2024"),
+        "{error}"
+    );
+    assert!(
+        parse(
+            "a.toml",
+            text.replace("T00:00:00Z", "T12:00:00+00:00").as_bytes(),
+            Path::new("")
+        )
+        .is_ok()
+    );
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! The plan in words, one line each, with the reason.
 
 use nestrad_common::canopy::{Canopy, Kind};
+use nestrad_common::inspection::SunFacts;
 use nestrad_common::options::Diameter;
 
 use super::{Estimator, Plan, Settings};
@@ -8,7 +9,9 @@ use crate::lit_canopy::LitCanopy;
 
 /// Says what a plan does and why.
 pub(super) fn of(lit: &LitCanopy, settings: &Settings, plan: &Plan) -> Vec<String> {
-    let mut lines = vec![light(lit, plan), bands(lit, plan)];
+    let mut lines = vec![light(lit, plan)];
+    lines.extend(sun(lit));
+    lines.push(bands(lit, plan));
     lines.push(exchange(settings, plan));
     lines.push(field(lit.canopy, settings, plan));
     lines.push(faces(lit.canopy));
@@ -32,6 +35,11 @@ fn light(lit: &LitCanopy, plan: &Plan) -> String {
             format!("light: {n} parallel sources, projected at {pitch_mm:.2} mm for the strongest")
         }
     }
+}
+
+fn sun(lit: &LitCanopy) -> Option<String> {
+    let suns = &lit.sources.list[lit.sources.sky_directions..];
+    SunFacts::of(suns).map(|sun| format!("sun: {sun}"))
 }
 
 fn bands(lit: &LitCanopy, plan: &Plan) -> String {

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::path::Path;
 
-use nestrad_common::options::Unit;
+use nestrad_common::options::{Unit, Up};
 use nestrad_engine::rounds::Accuracy;
 use nestrad_engine::solution::Balance;
 use serde::de::Error;
@@ -31,6 +31,9 @@ pub(crate) struct SummaryFacts {
 pub(crate) struct OptionFacts {
     pub(crate) scenes: Vec<String>,
     pub(crate) unit: Unit,
+    /// Results of an earlier version do not have it.
+    #[serde(default)]
+    pub(crate) up: Up,
     pub(crate) light: String,
     pub(crate) sources: usize,
     pub(crate) accuracy_percent: f64,

@@ -218,6 +218,7 @@ fn canopy(request: &Request<'_>, results: &Results) -> Result<Canopy, ReportErro
     let solved = Inputs {
         scenes: options.scenes.iter().map(PathBuf::from).collect(),
         unit: Some(options.unit),
+        up: Some(options.up),
         ..Inputs::default()
     };
     let inputs = match &request.scene {

@@ -90,13 +90,11 @@ impl SolveService for Rpc {
                 return Err(ServiceError::new(ErrorCode::Invalid, message).into());
             }
         };
-        let is_dark = lighting.light.is_dark();
+        let of_light = lighting.light.warnings(&lighting.optics.names());
         let scene = self.scenes.keep_scene(geometry, lighting)?;
         let facts = facts(scene.geometry());
         let mut warnings = scene.geometry().inspection.warnings.clone();
-        if is_dark {
-            warnings.push("no source has any light in any band".to_owned());
-        }
+        warnings.extend(of_light);
         tracing::info!(scene = %scene.id, triangles = facts.triangles, "scene uploaded");
         Ok(Response::new(v1::UploadSceneResponse {
             scene_id: scene.id.to_string(),

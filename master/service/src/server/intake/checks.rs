@@ -6,10 +6,11 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nestrad_common::canopy::Kind;
-use nestrad_common::formats::light::MIN_DESCENT;
 use nestrad_common::formats::pattern::{MIN_SIDE, Rectangle};
 use nestrad_common::light::sky::Radiance;
-use nestrad_common::light::{Light, SkyLight, Source};
+use nestrad_common::light::{
+    AN_IRRADIANCE, Light, MIN_DESCENT, POINTS_DOWN, SkyLight, Source, is_irradiance,
+};
 use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
 use nestrad_proto::v1;
 use nestrad_proto::v1::scene_material::Kind as Sent;
@@ -117,7 +118,7 @@ fn sky(given: &v1::SkyLight, bands: usize) -> Result<SkyLight, ServiceError> {
             if !towards_sun.is_finite() || towards_sun.z < MIN_DESCENT {
                 return Err(ServiceError::invalid(
                     "sky.cie_clear.towards_sun",
-                    "a direction that points up (z above 0)",
+                    "a direction that points up, 0.0057 degrees above the horizon or more",
                     format_args!("{x} {y} {z}"),
                 ));
             }
@@ -148,10 +149,10 @@ fn check_irradiance(of: &str, given: &[f64], bands: usize) -> Result<(), Service
         let wanted = format_args!("{bands}, one per band");
         return Err(ServiceError::invalid(place, wanted, given.len()));
     }
-    if let Some(b) = given.iter().position(|e| !(e.is_finite() && *e >= 0.0)) {
+    if let Some(b) = given.iter().position(|e| !is_irradiance(*e)) {
         return Err(ServiceError::invalid(
             format_args!("{of}.irradiance_W_m2[{b}]"),
-            "a finite number of at least 0",
+            AN_IRRADIANCE,
             given[b],
         ));
     }
@@ -166,7 +167,7 @@ fn source(s: usize, given: &v1::ParallelSource, bands: usize) -> Result<Source, 
     if !direction.is_finite() || direction.z > -MIN_DESCENT {
         return Err(ServiceError::invalid(
             format_args!("sources[{s}]: direction"),
-            "a direction of travel that points down (z below 0)",
+            POINTS_DOWN,
             format_args!("{} {} {}", found.x, found.y, found.z),
         ));
     }

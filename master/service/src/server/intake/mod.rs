@@ -15,7 +15,7 @@ use nestrad_common::canopy::{Organ, Triangle};
 use nestrad_common::formats::pattern::Rectangle;
 use nestrad_common::formats::{GeometryFile, MAX_COORDINATE, MAX_TRIANGLES, Origins};
 use nestrad_common::inspection::inspect;
-use nestrad_common::options::Unit;
+use nestrad_common::options::{Unit, Up};
 use nestrad_proto::v1;
 
 use super::error::{ErrorCode, ServiceError};
@@ -183,6 +183,7 @@ impl Upload {
             pattern: self.pattern,
             soil: self.soil_z_m,
             unit: Unit::Metre,
+            up: Up::Z,
         };
         let (mut canopy, _) =
             build_canopy(geometry).map_err(|e| ServiceError::new(ErrorCode::Invalid, e))?;

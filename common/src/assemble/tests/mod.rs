@@ -1,5 +1,6 @@
 //! From files to scenes, and from bad files to messages.
 
+mod light;
 mod organs;
 
 use std::fs;
@@ -9,9 +10,10 @@ use tempfile::TempDir;
 
 use super::*;
 use crate::canopy::Material;
-use crate::inputs::BandInput;
+use crate::inputs::{BandInput, PatternInput};
 use crate::light::Sky;
-use crate::options::Unit;
+use crate::optics::LeafOptics;
+use crate::options::{Unit, Up};
 
 const LEAF: &str = "p 1 100001001001 3 0 0 1 1 0 1 0 1 1\n";
 
@@ -104,6 +106,57 @@ fn fault_results_do_not_depend_on_the_unit_of_length() {
         let (a, b) = (metres.pattern.unwrap(), other.pattern.unwrap());
         assert!(a.size_m.abs_diff_eq(b.size_m, 1e-15));
         assert!((metres.soil_z_m.unwrap() - other.soil_z_m.unwrap()).abs() < 1e-15);
+    }
+}
+
+#[test]
+fn with_y_up_the_scene_is_the_one_that_stands() {
+    let lying = |text: &str| {
+        let mut case = Case::new("").pattern([-1.0, -2.0, 1.0, 2.0]).soil(0.25);
+        case.inputs.up = Some(Up::Y);
+        let scene = case.file("a.obj", text);
+        case.inputs.scenes = vec![
+            scene,
+            case.file("b.can", &LEAF.replace("0 1 1\n", "0 2 1\n")),
+        ];
+        case.inputs.bands[0]
+            .materials
+            .insert("default".to_owned(), LeafOptics::opaque(0.1));
+        case.loaded().scene.canopy
+    };
+    // x to the right, y up, z to the viewer; the left-hand face looks up once it stands
+    let scene = lying("v 0 0.5 0\nv 1 0.5 0\nv 1 0.5 -1\nf 1 2 3\n");
+    let user = |t: usize| {
+        scene
+            .triangle(t)
+            .corners_m
+            .map(|v| (v + scene.origin_m).to_array())
+    };
+    assert_eq!(user(0), [[0.0, 0.0, 0.5], [1.0, 0.0, 0.5], [1.0, 1.0, 0.5]]);
+    assert_eq!(
+        user(1),
+        [[0.0, -1.0, 0.0], [1.0, -1.0, 0.0], [0.0, -1.0, 2.0]]
+    );
+    assert_eq!(scene.soil_z_m, Some(0.25));
+    assert_eq!(scene.pattern.unwrap().size_m.to_array(), [2.0, 4.0]);
+    assert_eq!(scene.origin_m.z, 0.0);
+}
+
+#[test]
+fn a_scene_of_an_odd_size_has_an_odd_unit() {
+    for (size, warns) in [
+        ("0.0099", true),
+        ("0.01", false),
+        ("1e4", false),
+        ("1.01e4", true),
+    ] {
+        let can = LEAF.replace(
+            "3 0 0 1 1 0 1 0 1 1",
+            &format!("3 0 0 0 {size} 0 0 0 0 {size}"),
+        );
+        let warnings = Case::new(&can).loaded().inspection.warnings;
+        let unit = "the unit may be wrong (m, cm or mm)";
+        assert_eq!(warnings.iter().any(|w| w.ends_with(unit)), warns, "{size}");
     }
 }
 
@@ -232,39 +285,6 @@ fn materials_by_name_come_from_the_scene_file() {
     assert!(
         case.refusal()
             .starts_with("soil in band PAR (scene.toml, line 3): rho = 1.5")
-    );
-}
-
-#[test]
-fn light_per_band_shares_directions_and_leaves_out_the_dark() {
-    let mut case = Case::new(LEAF);
-    let second = BandInput {
-        name: "NIR".into(),
-        ..case.inputs.bands[0].clone()
-    };
-    case.inputs.bands.push(second);
-    let par = case.file("par.light", "0 1 0 -1\n100 0 0 -1\n30 0 0.5 -1\n");
-    let nir = case.file("nir.light", "80 0 0 -2\n0 1 0 -1\n7 0 -0.5 -1\n1 -0 0 -1\n");
-    let files = [("PAR".to_owned(), par.clone()), ("NIR".to_owned(), nir)];
-    case.inputs.light = Some(LightInput::Files(files.into()));
-    let light = case.loaded().scene.light;
-    let sources = &light.suns;
-    let irradiance: Vec<&[f64]> = sources.iter().map(|s| &s.irradiance_W_m2[..]).collect();
-    assert_eq!(irradiance, [[100.0, 81.0], [30.0, 0.0], [0.0, 7.0]]);
-
-    let files = [("PAR".to_owned(), par), ("UV".to_owned(), "x".into())];
-    case.inputs.light = Some(LightInput::Files(files.into()));
-    assert_eq!(
-        case.refusal(),
-        "light is given for bands PAR, UV, expected PAR, NIR"
-    );
-    let dark = case.file("dark.light", "0 0 0 -1\n");
-    case.inputs.light = Some(LightInput::File(dark));
-    let loaded = case.loaded();
-    assert!(loaded.scene.light.suns.is_empty());
-    assert_eq!(
-        loaded.inspection.warnings,
-        ["no source has any light in any band"]
     );
 }
 
