@@ -6,6 +6,8 @@ use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t}
 use thiserror::Error;
 use toml::value::{Datetime, Offset};
 
+use crate::figures::fixed;
+
 /// The apparent position of the sun above the horizon.
 ///
 /// Apparent, because light arrives along the refracted ray: standard refraction at sea level
@@ -127,7 +129,8 @@ pub enum SunError {
     /// It is night.
     #[error(
         "the sun is below the horizon at {time_utc}, latitude {latitude_deg}, longitude \
-         {longitude_deg}: its elevation is {elevation_deg:.2} degrees"
+         {longitude_deg}: its elevation is {} degrees",
+        fixed(*elevation_deg, 2)
     )]
     BelowHorizon {
         /// As given.

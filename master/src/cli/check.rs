@@ -3,8 +3,9 @@
 use anyhow::Result;
 use clap::Args;
 use nestrad_common::assemble;
+use nestrad_common::figures::fixed;
 use nestrad_common::inspection::Inspection;
-use nestrad_common::light::{Light, SkyLight};
+use nestrad_common::light::Light;
 use nestrad_common::optics::FaceOptics;
 use nestrad_common::options::Options;
 use nestrad_common::scene::Scene;
@@ -71,10 +72,9 @@ impl Facts {
         self.line("", &areas);
         let [low, high] = [facts.lower_m, facts.upper_m];
         let ranges: Vec<String> = (0..3)
-            // adding zero turns -0 into 0
-            .map(|k| [low[k], high[k]].map(|x| (x * 1e3).round() / 1e3 + 0.0))
+            .map(|k| [low[k], high[k]].map(|x| fixed(x, 3)))
             .zip(["x", "y", "z"])
-            .map(|([low, high], axis)| format!("{axis} {low:.3} to {high:.3} m"))
+            .map(|([low, high], axis)| format!("{axis} {low} to {high} m"))
             .collect();
         self.line("extent", &ranges.join(", "));
         let pattern = match facts.pattern_m {
@@ -86,7 +86,7 @@ impl Facts {
         };
         self.line("pattern", &pattern);
         let soil = match facts.soil_z_m {
-            Some(z) => format!("a plane at z = {z:.3} m"),
+            Some(z) => format!("a plane at z = {} m", fixed(z, 3)),
             None => "no plane: a black void below".to_owned(),
         };
         self.line("soil", &soil);
@@ -95,12 +95,14 @@ impl Facts {
                 Some(_) => "ground",
                 None => "the box around the scene",
             };
-            let index = format!("{index:.3} m², one-sided, without soil, per m² of {ground}");
+            let index = fixed(index, 3);
+            let index = format!("{index} m², one-sided, without soil, per m² of {ground}");
             self.line("area", &index);
         }
         for material in &facts.materials {
             let (triangles, area_m2) = (material.triangles, material.area_m2);
-            let text = format!("{}: {triangles} triangles, {area_m2:.4} m²", material.name);
+            let area_m2 = fixed(area_m2, 4);
+            let text = format!("{}: {triangles} triangles, {area_m2} m²", material.name);
             self.line("material", &text);
         }
     }
@@ -126,13 +128,14 @@ impl Facts {
 
     fn light(&mut self, scene: &Scene) {
         let Light { suns, sky } = &*scene.light;
-        let sum = |band: usize| {
-            let of_sky = |sky: &SkyLight| sky.diffuse_fraction * sky.irradiance_W_m2[band];
-            let of_suns: f64 = suns.iter().map(|s| s.irradiance_W_m2[band]).sum();
-            of_suns + sky.as_ref().map_or(0.0, of_sky)
-        };
         let totals = (0..).zip(&scene.optics.bands);
-        let totals = totals.map(|(b, band)| format!("{} {:.2} W m⁻²", band.name, sum(b)));
+        let totals = totals.map(|(b, band)| {
+            format!(
+                "{} {} W m⁻²",
+                band.name,
+                fixed(scene.light.irradiance_W_m2(b), 2)
+            )
+        });
         let totals = totals.collect::<Vec<_>>().join(", ");
         let s = if suns.len() == 1 { "" } else { "s" };
         let what = match (suns.len(), sky) {

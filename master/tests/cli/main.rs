@@ -6,6 +6,7 @@ mod checks;
 mod desk;
 mod generated;
 mod help;
+mod minus_zero;
 mod refusals;
 mod results;
 mod trades;
