@@ -33,17 +33,46 @@ pub(crate) struct OptionFacts {
     pub(crate) unit: Unit,
     pub(crate) light: String,
     pub(crate) sources: usize,
+    pub(crate) bands: Vec<BandFacts>,
     pub(crate) accuracy_percent: f64,
     pub(crate) seed: u64,
+}
+
+/// A band as it was asked for.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct BandFacts {
+    /// Of the horizontal above the canopy; results of an earlier version do not have it.
+    pub(crate) irradiance_W_m2: Option<f64>,
 }
 
 /// The scene in short.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct SceneFacts {
+    pub(crate) lower_m: [f64; 3],
+    pub(crate) upper_m: [f64; 3],
     pub(crate) pattern_m: Option<[f64; 2]>,
     pub(crate) soil_z_m: Option<f64>,
     pub(crate) plants: usize,
     pub(crate) area_index: Option<f64>,
+}
+
+impl SceneFacts {
+    /// Extent of the pattern, or of the box around a scene that stands alone.
+    pub(crate) fn ground_m(&self) -> [f64; 2] {
+        let side = |axis: usize| self.upper_m[axis] - self.lower_m[axis];
+        self.pattern_m.unwrap_or([side(0), side(1)])
+    }
+}
+
+impl SummaryFacts {
+    /// Irradiance of the horizontal above the canopy, per band.
+    pub(crate) fn above_W_m2(&self) -> Vec<f64> {
+        let ground_m2 = self.plan.scale.ground_area_m2;
+        let bands = self.options.bands.iter().zip(&self.energy_balance);
+        bands
+            .map(|(band, b)| band.irradiance_W_m2.unwrap_or(b.incoming_W / ground_m2))
+            .collect()
+    }
 }
 
 /// What the plan said.
@@ -71,6 +100,9 @@ pub(crate) struct SpreadFacts {
 /// An organ and its light.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Organ {
+    /// Where the tables have it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub(crate) species: Option<String>,
     pub(crate) plant: String,
     pub(crate) organ: String,
     pub(crate) area_m2: f64,
@@ -123,19 +155,13 @@ pub(crate) struct Results {
 /// Reads a folder of results.
 pub(crate) fn read(folder: &Path) -> Result<Results, ReportError> {
     let summary = summary(folder)?;
-    let is_there = |name: &str| folder.join(name).exists();
-    if is_there("triangles.parquet") && !is_there("triangles.csv") {
-        let folder = folder.to_owned();
-        return Err(ReportError::Parquet { folder });
-    }
     let balance = summary.energy_balance.iter();
     let bands: Vec<String> = balance.map(|balance| balance.band.clone()).collect();
     let organs = organs(folder, &bands)?;
     let triangles = triangles(folder, &bands, &organs)?;
-    let soil = if is_there("soil.csv") {
-        soil(folder, &bands)?
-    } else {
-        None
+    let soil = match Table::find(folder, "soil")? {
+        Some(table) => soil(&table, &bands)?,
+        None => None,
     };
     Ok(Results {
         summary,
@@ -160,13 +186,20 @@ fn summary(folder: &Path) -> Result<SummaryFacts, ReportError> {
         if summary.energy_balance.is_empty() {
             return Err(serde_json::Error::custom("energy_balance has no bands"));
         }
+        if summary.options.bands.len() != summary.energy_balance.len() {
+            let fault = "options and energy_balance have different numbers of bands";
+            return Err(serde_json::Error::custom(fault));
+        }
         Ok(summary)
     });
     read.map_err(|source| ReportError::Summary { path, source })
 }
 
+/// Tables of some versions have it, of others not.
+const SPECIES: &str = "species";
+
 fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
-    let columns = [
+    let mut columns = vec![
         "plant",
         "organ",
         "area_m2",
@@ -179,13 +212,16 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
     ];
     let mut organs: Vec<Organ> = Vec::new();
     let mut rows = 0;
-    let table = Table::read(folder.join("organs.csv"))?;
+    let table = Table::open(folder, "organs")?;
+    let species = table.has(SPECIES).then_some(columns.len());
+    columns.extend(species.map(|_| SPECIES));
     table.rows(&columns, |row| {
         row.must_be(3, &bands[rows % bands.len()])?;
         if rows.is_multiple_of(bands.len()) {
             organs.push(Organ {
-                plant: row.text(0).to_owned(),
-                organ: row.text(1).to_owned(),
+                species: species.map(|column| row.text(column).into_owned()),
+                plant: row.text(0).into_owned(),
+                organ: row.text(1).into_owned(),
                 area_m2: row.real(2)?,
                 light: Vec::with_capacity(bands.len()),
             });
@@ -209,7 +245,7 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
 }
 
 fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triangles, ReportError> {
-    let columns = [
+    let mut columns = vec![
         "triangle",
         "plant",
         "organ",
@@ -220,26 +256,34 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
         "absorbed_W_m2",
         "absorbed_direct_W_m2",
     ];
-    let by_name: HashMap<(&str, &str), u32> = organs
-        .iter()
-        .zip(0..)
-        .map(|(organ, index)| ((organ.plant.as_str(), organ.organ.as_str()), index))
-        .collect();
+    let table = Table::open(folder, "triangles")?;
+    let species = table.has(SPECIES).then_some(columns.len());
+    columns.extend(species.map(|_| SPECIES));
+    let name = |organ: &Organ| {
+        (
+            organ.species.clone(),
+            organ.plant.clone(),
+            organ.organ.clone(),
+        )
+    };
+    let by_name: HashMap<(Option<String>, String, String), u32> =
+        organs.iter().map(name).zip(0..).collect();
     let mut found = Triangles::default();
-    let table = Table::read(folder.join("triangles.csv"))?;
     table.rows(&columns, |row| {
         let (triangle, band) = (
             found.light.len() / bands.len(),
             found.light.len() % bands.len(),
         );
         if row.index(0)? != triangle {
-            return Err(row.not(&format!("triangle {triangle}"), row.text(0)));
+            return Err(row.not(&format!("triangle {triangle}"), &row.text(0)));
         }
         row.must_be(4, &bands[band])?;
         if band == 0 {
-            let name = (row.text(1), row.text(2));
+            let species = species.map(|column| row.text(column).into_owned());
+            let name = (species, row.text(1).into_owned(), row.text(2).into_owned());
             let organ = by_name.get(&name).copied();
-            let organ = organ.ok_or_else(|| row.not("an organ of organs.csv", row.text(2)))?;
+            let organ =
+                organ.ok_or_else(|| row.not("an organ of the table of organs", &row.text(2)))?;
             found.organ.push(organ);
             found.area_m2.push(row.real(3)?);
         }
@@ -256,7 +300,7 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
     Ok(found)
 }
 
-fn soil(folder: &Path, bands: &[String]) -> Result<Option<Soil>, ReportError> {
+fn soil(table: &Table, bands: &[String]) -> Result<Option<Soil>, ReportError> {
     let columns = [
         "ix",
         "iy",
@@ -269,7 +313,6 @@ fn soil(folder: &Path, bands: &[String]) -> Result<Option<Soil>, ReportError> {
     ];
     let mut soil: Option<Soil> = None;
     let mut rows = 0;
-    let table = Table::read(folder.join("soil.csv"))?;
     table.rows(&columns, |row| {
         let band = rows % bands.len();
         row.must_be(6, &bands[band])?;
