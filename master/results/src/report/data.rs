@@ -326,13 +326,16 @@ fn soil(table: &Table, bands: &[String]) -> Result<Option<Soil>, ReportError> {
             irradiance_W_m2: vec![Vec::new(); bands.len()],
         });
         // cells come row by row: the last one has the largest numbers
-        (soil.nx, soil.ny) = (row.index(0)? + 1, row.index(1)? + 1);
+        let [ix, iy] = [row.index(0)?, row.index(1)?];
+        (soil.nx, soil.ny) = (ix.saturating_add(1), iy.saturating_add(1));
         soil.irradiance_W_m2[band].push(row.real(7)? as f32);
         rows += 1;
         Ok(())
     })?;
-    let cells = soil.as_ref().map_or(0, |soil| soil.nx * soil.ny);
-    if rows != cells * bands.len() {
+    let cells = soil
+        .as_ref()
+        .map_or(0, |soil| soil.nx.saturating_mul(soil.ny));
+    if rows != cells.saturating_mul(bands.len()) {
         return Err(table.is_cut_off(rows));
     }
     Ok(soil)

@@ -68,7 +68,7 @@ function showPicked() {
   const line = (what, value, unit) => `<tr><td>${what}</td><td>${value} ${unit}</td></tr>`;
   const lines = organ.light.map((light, band) => `<tr><th colspan="2">${html(report.bands[band])}</th></tr>` +
     line('absorbed', withError(light.absorbed_W, light.se_W), 'W') +
-    line('straight from the sources', figure(light.direct_W), 'W') +
+    line('straight from sources', figure(light.direct_W), 'W') +
     line('on the upper face', figure(light.upper_W_m2), 'W m⁻²') +
     line('on the lower face', figure(light.lower_W_m2), 'W m⁻²')).join('');
   const name = organName(organ);

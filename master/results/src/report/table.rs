@@ -3,6 +3,7 @@
 
 use std::borrow::Cow;
 use std::fs::{self, File};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use parquet::errors::ParquetError;
@@ -91,7 +92,7 @@ impl Table {
             Ok(file) => file,
             Err(source) => return Err(ReportError::Read { path, source }),
         };
-        let reader = match SerializedFileReader::new(file) {
+        let reader = match guarded(|| SerializedFileReader::new(file)) {
             Ok(reader) => reader,
             Err(source) => return Err(ReportError::Parquet { path, source }),
         };
@@ -143,10 +144,11 @@ impl Table {
                 }
             }
             Content::Parquet(reader) => {
-                let rows = parquet_rows(reader, columns).map_err(|e| self.not_parquet(e))?;
-                for fields in rows {
+                let broken = |error| self.not_parquet(error);
+                let mut rows = guarded(|| parquet_rows(reader, columns)).map_err(broken)?;
+                while let Some(cells) = guarded(|| rows.next().transpose()).map_err(broken)? {
                     row.number += 1;
-                    row.cells = fields.map_err(|e| self.not_parquet(e))?;
+                    row.cells = cells;
                     each(&row)?;
                 }
             }
@@ -168,6 +170,12 @@ impl Table {
             found: "the end of the table".to_owned(),
         }
     }
+}
+
+/// Reads of a Parquet file, which may be damaged: the library has checks that panic.
+fn guarded<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
+    catch_unwind(AssertUnwindSafe(read))
+        .unwrap_or_else(|_| Err(ParquetError::General("the file is damaged".to_owned())))
 }
 
 /// The cells of these columns, which the file has, row by row.
@@ -303,6 +311,41 @@ mod tests {
             })
             .expect("read");
         assert_eq!(rows, [("PAR".to_owned(), 1.5)]);
+    }
+
+    #[test]
+    fn a_damaged_parquet_file_is_an_error_or_other_values() {
+        let written = table::Table {
+            name: "t",
+            rows: 20,
+            columns: vec![
+                Column::index("triangle", |row| row / 2),
+                Column::text("band", |row| ["PAR", "NIR"][row % 2]),
+                Column::quantity("x", |row| row as f64 / 3.0),
+            ],
+        };
+        let mut bytes = Vec::new();
+        crate::parquet::write(&written, &mut bytes).expect("written");
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut refused = 0;
+        let mut read = |bytes: &[u8]| {
+            fs::write(folder.path().join("t.parquet"), bytes).expect("written");
+            let table = Table::open(folder.path(), "t");
+            let rows = table.and_then(|table| {
+                let each = |row: &Row<'_>| row.index(0).and(row.real(2)).map(drop);
+                table.rows(&["triangle", "band", "x"], each)
+            });
+            refused += usize::from(rows.is_err());
+        };
+        for at in 0..bytes.len() {
+            read(&bytes[..at]);
+            for change in [0x15, 0xff] {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= change;
+                read(&damaged);
+            }
+        }
+        assert!(refused > bytes.len());
     }
 
     /// Every table that is written reads back alike from both formats.
