@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use thiserror::Error;
 
+use crate::canopy::Kind;
 use crate::formats::Place;
 use crate::formats::light::is_irradiance;
 use crate::light::Sky;
@@ -23,6 +24,8 @@ pub struct Inputs {
     pub pattern: Option<PatternInput>,
     /// Height of the soil plane in `unit`; `None` for a black void below.
     pub soil: Option<f64>,
+    /// What counts as what.
+    pub kinds: KindsInput,
     /// In the order of the results.
     pub bands: Vec<BandInput>,
     /// The light above the canopy.
@@ -42,6 +45,11 @@ impl Inputs {
             unit: self.unit.or(other.unit),
             pattern: self.pattern.or(other.pattern),
             soil: self.soil.or(other.soil),
+            kinds: if self.kinds == KindsInput::default() {
+                other.kinds
+            } else {
+                self.kinds
+            },
             bands: if self.bands.is_empty() {
                 other.bands
             } else {
@@ -60,6 +68,15 @@ pub enum PatternInput {
     File(PathBuf),
     /// x y and x y of two opposite corners.
     Corners([f64; 4]),
+}
+
+/// What surfaces count as, where it is not what their file says.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct KindsInput {
+    /// Materials by name (OBJ).
+    pub materials: BTreeMap<String, Kind>,
+    /// All of a CAN species, by its number.
+    pub species: BTreeMap<u32, Kind>,
 }
 
 /// A wavelength band and where its optical properties are.

@@ -6,7 +6,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use glam::{DVec2, DVec3};
 use serde::Serialize;
 
-use crate::canopy::{Canopy, Material};
+use crate::canopy::{Canopy, Kind, Material};
 use crate::formats::Origins;
 use crate::geometry::{area, longest_edge};
 
@@ -17,7 +17,7 @@ pub struct Inspection {
     pub triangles: usize,
     /// Groups of triangles that are reported as one.
     pub organs: usize,
-    /// Groups of organs.
+    /// Groups of organs; soil and structures are none.
     pub plants: usize,
     /// In order of first appearance.
     pub materials: Vec<MaterialFacts>,
@@ -29,7 +29,7 @@ pub struct Inspection {
     pub pattern_m: Option<[f64; 2]>,
     /// Height of the soil plane.
     pub soil_z_m: Option<f64>,
-    /// One-sided area of all but soil per area of ground: of the pattern, or of the box around an
+    /// One-sided area of leaves and stems per area of ground: of the pattern, or of the box around an
     /// isolated canopy. `None` where that ground has no area.
     pub area_index: Option<f64>,
     /// One-sided area of the smallest triangle, degenerate ones left out, m².
@@ -54,6 +54,8 @@ pub struct Inspection {
 pub struct MaterialFacts {
     /// As in messages: `leaf of species 1`, or the name in an OBJ file.
     pub name: String,
+    /// What it counts as.
+    pub kind: Kind,
     /// How many.
     pub triangles: usize,
     /// One-sided area, m².
@@ -71,7 +73,9 @@ pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
         plants: canopy
             .organs
             .iter()
-            .map(|organ| &organ.plant)
+            .zip(canopy.plants())
+            .filter(|(_, is_plant)| *is_plant)
+            .map(|(organ, _)| (&organ.species, &organ.plant))
             .collect::<BTreeSet<_>>()
             .len(),
         pattern_m: canopy.pattern.map(|pattern| pattern.size_m.to_array()),
@@ -112,12 +116,14 @@ pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
 
 impl Inspection {
     fn areas(&mut self, canopy: &Canopy, origins: &Origins, extent: DVec2) {
-        let new = |material: &Material| MaterialFacts {
+        let new = |(material, kind): (&Material, Kind)| MaterialFacts {
             name: material.to_string(),
+            kind,
             triangles: 0,
             area_m2: 0.0,
         };
-        self.materials = canopy.materials.iter().map(new).collect();
+        let materials = canopy.materials.iter().zip(canopy.kinds());
+        self.materials = materials.map(new).collect();
         let mut smallest = f64::INFINITY;
         let mut first_degenerate = None;
         for (index, triangle) in canopy.triangles().enumerate() {
@@ -146,11 +152,8 @@ impl Inspection {
             );
         }
         let ground = canopy.pattern.map_or(extent.x * extent.y, |p| p.area_m2());
-        let materials = self.materials.iter().zip(&canopy.materials);
-        let plants: f64 = materials
-            .filter(|(_, material)| **material != Material::Soil)
-            .map(|(facts, _)| facts.area_m2)
-            .sum();
+        let plants = self.materials.iter().filter(|of| of.kind.is_plant());
+        let plants: f64 = plants.map(|of| of.area_m2).sum();
         self.area_index = (ground > 0.0).then(|| plants / ground);
     }
 

@@ -13,7 +13,7 @@ from nestrad.v1 import results_pb2 as results_pb
 from nestrad.v1 import scene_pb2 as scene_pb
 from nestrad.v1.client_pb2_grpc import SolveServiceStub
 
-LEAF, STEM, SOIL = range(3)
+LEAF, STEM, SOIL, STRUCTURE = range(4)
 
 # messages are 8 MiB at most; a triangle takes about 80 bytes
 _TRIANGLES = 6000
@@ -34,9 +34,10 @@ class Geometry:
     organ: np.ndarray  # (triangles,), index into organs
     material: np.ndarray  # (triangles,), index into materials
     organs: list  # of (plant, organ), both str
-    materials: list  # of (name, LEAF | STEM | SOIL)
+    materials: list  # of (name, LEAF | STEM | SOIL | STRUCTURE)
     pattern_m: tuple | None = None  # min x, min y, max x, max y; None: the scene stands alone
     soil_z_m: float | None = None  # None: a black void below
+    species: list | None = None  # one str per organ: plants of two species may have equal names
 
 
 @dataclass
@@ -61,6 +62,7 @@ class Organs:
     """Light per organ; columns are (organs, bands)."""
 
     bands: list
+    species: list = field(default_factory=list)
     plant: list = field(default_factory=list)
     organ: list = field(default_factory=list)
     area_m2: np.ndarray = None
@@ -133,6 +135,7 @@ class Master:
         organs = Organs(bands=list(slices[0].bands))
         shape = (-1, len(organs.bands))
         for slice in slices:
+            organs.species += slice.species
             organs.plant += slice.plant
             organs.organ += slice.id
         organs.area_m2 = np.concatenate([slice.area_m2 for slice in slices])
@@ -184,7 +187,9 @@ def _slices(geometry, bands, sources):
 
     for first in range(0, len(geometry.organs), _ORGANS):
         plants, organs = zip(*geometry.organs[first : first + _ORGANS])
-        yield scene_pb.SceneSlice(organs=scene_pb.OrganSlice(first=first, plant=plants, id=organs))
+        species = geometry.species and geometry.species[first : first + _ORGANS]
+        part = scene_pb.OrganSlice(first=first, plant=plants, id=organs, species=species)
+        yield scene_pb.SceneSlice(organs=part)
 
     for first in range(0, len(geometry.vertices_m), _TRIANGLES):
         part = slice(first, first + _TRIANGLES)

@@ -20,6 +20,7 @@ from nestrad_client import LEAF, Band, Geometry, Master, Sources
 
 PATTERN_M = (0.0, 0.0, 1.5, 0.8)
 SOIL_Z_M = 0.0
+SPECIES = "crop"
 MATERIALS = [("leaf", LEAF), ("dry leaf", LEAF)]
 BANDS = [
     Band("PAR", np.array([[0.09, 0.05, 0.11, 0.05], [0.25, 0.1, 0.25, 0.1]]), soil_albedo=0.15),
@@ -63,6 +64,7 @@ def canopy(day=30, seed=1):
         MATERIALS,
         PATTERN_M,
         SOIL_Z_M,
+        [SPECIES] * len(organs),
     )
 
 
@@ -77,9 +79,9 @@ def light(hour):
 
 
 def write_files(folder, geometry, hours):
-    """The same scenes as files: canopy.obj, and a scene file an hour."""
+    """The same scenes as files: SPECIES.obj, and a scene file an hour."""
     folder.mkdir(parents=True, exist_ok=True)
-    with open(folder / "canopy.obj", "w") as out:
+    with open(folder / f"{SPECIES}.obj", "w") as out:
         for number, (triangle, organ, material) in enumerate(
             zip(geometry.vertices_m, geometry.organ, geometry.material)
         ):
@@ -90,7 +92,7 @@ def write_files(folder, geometry, hours):
             out.write("f " + " ".join(str(3 * number + k) for k in (1, 2, 3)) + "\n")
     for hour in hours:
         sources = light(hour)
-        text = [f'scene = "canopy.obj"\npattern = {list(PATTERN_M)}\nsoil = {SOIL_Z_M}\n']
+        text = [f'scene = "{SPECIES}.obj"\npattern = {list(PATTERN_M)}\nsoil = {SOIL_Z_M}\n']
         text.append("[light.files]\n")
         for b, band in enumerate(BANDS):
             name = f"{band.name}-{hour}.light"
@@ -164,13 +166,13 @@ def main():
     rows = []
     with Master(args.master, token=os.environ.get("NESTRAD_TOKEN"), ca=ca) as master:
         for hour, light_of in steps(master, geometry, hours, args.accuracy):
-            names = zip(light_of.plant, light_of.organ)
-            for (plant, organ), absorbed_W in zip(names, light_of.absorbed_W.tolist()):
+            names = zip(light_of.species, light_of.plant, light_of.organ)
+            for name, absorbed_W in zip(names, light_of.absorbed_W.tolist()):
                 for band, value in zip(light_of.bands, absorbed_W):
-                    rows.append((hour, plant, organ, band, repr(value)))
+                    rows.append((hour, *name, band, repr(value)))
     with open(args.out, "w", newline="") as out:
         table = csv.writer(out, lineterminator="\n")
-        table.writerow(("hour", "plant", "organ", "band", "absorbed_W"))
+        table.writerow(("hour", "species", "plant", "organ", "band", "absorbed_W"))
         table.writerows(rows)
 
 

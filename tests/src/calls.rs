@@ -30,6 +30,7 @@ pub fn material(name: &str, kind: v1::scene_material::Kind) -> v1::SceneMaterial
     v1::SceneMaterial {
         name: name.to_owned(),
         kind: kind.into(),
+        solid: None,
     }
 }
 
@@ -67,6 +68,7 @@ pub fn one_leaf() -> [v1::SceneSlice; 3] {
         first: 0,
         id: vec!["blade".to_owned()],
         plant: vec!["plant".to_owned()],
+        species: vec!["maize".to_owned()],
     };
     let triangles = v1::TriangleSlice {
         first: 0,

@@ -26,8 +26,9 @@ pub fn unlit(generated: &Generated) -> Scenery {
         let organ = *organs.entry((label.plant, label.leaf)).or_insert(next);
         if organ == next {
             scenery.organs.push(Organ {
-                id: (1000 * label.plant + label.leaf).to_string(),
+                species: "1".to_owned(),
                 plant: label.plant.to_string(),
+                id: (1000 * label.plant + label.leaf).to_string(),
             });
         }
         scenery.triangles.push(Triangle {

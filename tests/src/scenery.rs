@@ -77,6 +77,7 @@ impl Scenery {
             self.organs.push(Organ {
                 id: organ.to_owned(),
                 plant: "1".to_owned(),
+                ..Organ::default()
             });
         }
         self.triangles.push(Triangle {

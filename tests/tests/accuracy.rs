@@ -93,6 +93,7 @@ fn a_round_that_misses_is_followed_by_a_finer_one() {
         scenery.organs.push(Organ {
             id: k.to_string(),
             plant: "0".to_owned(),
+            ..Organ::default()
         });
     }
     let scene = scenery.scene();

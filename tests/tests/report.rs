@@ -50,11 +50,13 @@ fn facts(page: &str) -> Value {
 fn last_organ(folder: &Path) -> (String, Vec<f64>) {
     let table = fs::read_to_string(folder.join("out/organs.csv")).unwrap();
     let rows: Vec<Vec<&str>> = table.lines().map(|row| row.split(',').collect()).collect();
-    let last = rows.last().unwrap()[1];
-    let own = rows.iter().filter(|row| row[1] == last);
+    let column = |name: &str| rows[0].iter().position(|column| *column == name).unwrap();
+    let (organ, absorbed) = (column("organ"), column("absorbed_W"));
+    let last = rows.last().unwrap()[organ];
+    let own = rows.iter().filter(|row| row[organ] == last);
     (
         last.to_owned(),
-        own.map(|row| row[6].parse().unwrap()).collect(),
+        own.map(|row| row[absorbed].parse().unwrap()).collect(),
     )
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::{LoadError, name};
-use crate::canopy::{Canopy, Material};
+use crate::canopy::{Canopy, Kind, Material};
 use crate::formats::opt::{Opt, parse};
 use crate::formats::read::{MAX_SMALL_BYTES, read};
 use crate::formats::{Origins, Place};
@@ -107,9 +107,16 @@ pub fn resolve_band(
     canopy: &Canopy,
     origins: &Origins,
 ) -> Result<Band, LoadError> {
-    let materials = (0..).zip(&canopy.materials);
+    let materials = (0..).zip(&canopy.materials).zip(canopy.kinds());
     let materials = materials
-        .map(|(index, material)| optics.material(material, || origins.first_use(canopy, index)))
+        .map(|((index, material), kind)| {
+            let found = optics.material(material, || origins.first_use(canopy, index))?;
+            if kind == Kind::Soil && found.upper.tau + found.lower.tau > 0.0 {
+                let (material, band) = (material.to_string(), optics.title());
+                return Err(LoadError::ClearSoil { material, band });
+            }
+            Ok(found)
+        })
         .collect::<Result<_, _>>()?;
     let soil_albedo = match canopy.soil_z_m {
         Some(_) => optics.material(&Material::Soil, Place::default)?.upper.rho,

@@ -45,6 +45,22 @@ pub enum LoadError {
         /// Their names.
         files: String,
     },
+    /// Two files have an organ of the same name, which would be one row of the results.
+    #[error(
+        "{again}: organ {id} of plant {plant} of species {species} is in {first} already; expected every organ in one file: number plants or species through all files"
+    )]
+    OrganTwice {
+        /// Where it is met again.
+        again: Place,
+        /// The organ.
+        id: String,
+        /// Its plant.
+        plant: String,
+        /// The plant's species.
+        species: String,
+        /// Where it is met first.
+        first: Place,
+    },
     /// All geometry files together hold too much.
     #[error("{files}: expected at most {MAX_TRIANGLES} triangles, found {found}")]
     TooManyTriangles {
@@ -75,6 +91,14 @@ pub enum LoadError {
         /// Its name.
         material: String,
         /// The band without it.
+        band: String,
+    },
+    /// Soil that lets light through.
+    #[error("{material} in band {band}: expected tau = 0, because it is declared to be soil")]
+    ClearSoil {
+        /// The material.
+        material: String,
+        /// The band.
         band: String,
     },
     /// There is soil, and a band without an albedo for it.

@@ -1,13 +1,14 @@
 //! Files to a canopy: in metres, from a local origin.
 
 use std::collections::HashMap;
+use std::path::Path;
 
 use glam::{DVec2, DVec3};
 
-use super::LoadError;
+use super::{LoadError, species};
 use crate::canopy::{Canopy, Material, Mesh, Organ, Pattern};
 use crate::formats::pattern::Rectangle;
-use crate::formats::{GeometryFile, MAX_COORDINATE, MAX_TRIANGLES, Origins, numbered};
+use crate::formats::{GeometryFile, MAX_COORDINATE, MAX_TRIANGLES, Origins, Place, numbered};
 use crate::options::Unit;
 
 /// The geometry of a canopy as the user gave it.
@@ -27,7 +28,8 @@ pub struct Geometry {
 /// the pattern, or else of the scene, at the height of the scene's lowest vertex. There a double
 /// resolves every leaf, and nothing later needs to know how far away the user's origin is.
 ///
-/// Organs and materials of the same name are the same, whichever file they come from.
+/// Materials of the same name are the same, whichever file they come from. An organ is all in one file: two files
+/// with one of the same name are refused. A file that does not say what species it holds is named after itself.
 pub fn build_canopy(geometry: Geometry) -> Result<(Canopy, Origins), LoadError> {
     let Geometry {
         files,
@@ -52,8 +54,12 @@ pub fn build_canopy(geometry: Geometry) -> Result<(Canopy, Origins), LoadError> 
         return Err(LoadError::SoilHeight { found });
     }
 
+    let paths: Vec<&Path> = files.iter().map(|file| Path::new(&file.file)).collect();
+    let species = species::names(&paths);
     let mut joined = Joined::default();
-    files.into_iter().for_each(|file| joined.add(file));
+    for (file, species) in files.into_iter().zip(&species) {
+        joined.add(file, species)?;
+    }
     let per_metre = unit.per_metre();
     let mut lower = DVec3::INFINITY;
     for vertex in joined.vertices() {
@@ -91,7 +97,7 @@ struct Joined {
 }
 
 impl Joined {
-    fn add(&mut self, file: GeometryFile) {
+    fn add(&mut self, file: GeometryFile, species: &str) -> Result<(), LoadError> {
         let GeometryFile {
             file,
             mut mesh,
@@ -100,8 +106,24 @@ impl Joined {
             materials,
             ..
         } = file;
-        let organ = |organ| numbered(&mut self.organ_numbers, &mut self.organs, organ);
-        let organs: Vec<u32> = organs.into_iter().map(organ).collect();
+        let before = self.organs.len();
+        let mut numbers = Vec::with_capacity(organs.len());
+        for mut organ in organs {
+            if organ.species.is_empty() {
+                species.clone_into(&mut organ.species);
+            }
+            let number = numbered(&mut self.organ_numbers, &mut self.organs, organ);
+            if (number as usize) < before && self.organs[number as usize] != Organ::soil() {
+                let own = mesh.organ.iter().position(|&o| o as usize == numbers.len());
+                let place = Place {
+                    file,
+                    line: own.and_then(|t| Some(*line.get(t)? as usize)),
+                };
+                return Err(self.twice(number, place));
+            }
+            numbers.push(number);
+        }
+        let organs = numbers;
         let material = |m| numbered(&mut self.material_numbers, &mut self.materials, m);
         let materials: Vec<u32> = materials.into_iter().map(material).collect();
         for (numbers, of) in [(&organs, &mut mesh.organ), (&materials, &mut mesh.material)] {
@@ -110,6 +132,21 @@ impl Joined {
         self.origins.extend(file, self.triangles, line);
         self.triangles += mesh.len();
         self.meshes.push(mesh);
+        Ok(())
+    }
+
+    /// The refusal of an organ that an earlier file has.
+    fn twice(&self, organ: u32, again: Place) -> LoadError {
+        let mut numbers = self.meshes.iter().flat_map(|mesh| &mesh.organ);
+        let first = numbers.position(|&number| number == organ);
+        let Organ { species, plant, id } = self.organs[organ as usize].clone();
+        LoadError::OrganTwice {
+            again,
+            id,
+            plant,
+            species,
+            first: self.origins.place(first.unwrap_or_default()),
+        }
     }
 
     fn vertices(&mut self) -> impl Iterator<Item = &mut DVec3> {

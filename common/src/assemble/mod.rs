@@ -3,7 +3,9 @@
 mod bands;
 mod error;
 mod geometry;
+mod kinds;
 mod lights;
+mod species;
 #[cfg(test)]
 mod tests;
 
@@ -13,7 +15,7 @@ use std::sync::Arc;
 use crate::canopy::Canopy;
 use crate::formats::pattern::Rectangle;
 use crate::formats::read::{MAX_GEOMETRY_BYTES, MAX_SMALL_BYTES, read};
-use crate::formats::{self, FormatError, GeometryFile};
+use crate::formats::{self, FormatError, GeometryFile, Origins};
 use crate::inputs::{Inputs, LightInput, PatternInput};
 use crate::inspection::{Inspection, inspect};
 use crate::light::{Light, Source};
@@ -64,12 +66,13 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
         .map(BandOptics::read)
         .collect::<Result<Vec<_>, _>>()?;
     let light = self::light(light, &bands)?;
-    let (canopy, origins) = build_canopy(read_geometry(inputs)?)?;
+    let (canopy, origins) = read_canopy(inputs)?;
     let bands = optics
         .into_iter()
         .map(|optics| resolve_band(optics, &canopy, &origins))
         .collect::<Result<_, _>>()?;
     let mut inspection = inspect(&canopy, &origins);
+    inspection.warnings.extend(kinds::unknown(inputs, &canopy));
     if light.is_dark() {
         inspection
             .warnings
@@ -104,13 +107,21 @@ fn light(input: &LightInput, bands: &[String]) -> Result<Light, LoadError> {
 /// Looks through the geometry alone, as [`load`] would: for scenes whose optics or light are not good
 /// yet.
 pub fn inspect_geometry(inputs: &Inputs) -> Result<Inspection, LoadError> {
-    let (canopy, origins) = build_canopy(read_geometry(inputs)?)?;
-    Ok(inspect(&canopy, &origins))
+    let (canopy, origins) = read_canopy(inputs)?;
+    let mut inspection = inspect(&canopy, &origins);
+    inspection.warnings.extend(kinds::unknown(inputs, &canopy));
+    Ok(inspection)
 }
 
 /// Reads the canopy alone, in metres: where it stands is all that a drawing of results needs.
 pub fn load_canopy(inputs: &Inputs) -> Result<Canopy, LoadError> {
-    Ok(build_canopy(read_geometry(inputs)?)?.0)
+    Ok(read_canopy(inputs)?.0)
+}
+
+fn read_canopy(inputs: &Inputs) -> Result<(Canopy, Origins), LoadError> {
+    let (mut canopy, origins) = build_canopy(read_geometry(inputs)?)?;
+    canopy.declared = kinds::declared(inputs, &canopy);
+    Ok((canopy, origins))
 }
 
 fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {

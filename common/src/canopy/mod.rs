@@ -1,13 +1,16 @@
 //! The canopy: meshes with their organs and materials, the pattern, the soil. There is no light in it.
 
+mod kind;
 mod mesh;
 mod weld;
 
+use std::collections::BTreeMap;
 use std::fmt;
 
 use glam::{DAffine3, DVec2, DVec3};
 
 use crate::geometry;
+pub use kind::Kind;
 pub use mesh::{Mesh, Triangle};
 pub use weld::Welder;
 
@@ -26,6 +29,8 @@ pub struct Canopy {
     pub organs: Vec<Organ>,
     /// In order of first appearance; optics are looked up by this name.
     pub materials: Vec<Material>,
+    /// What materials count as that the user declared; the others count as what they are ([`Material::kind`]).
+    pub declared: BTreeMap<Material, Kind>,
     /// What was subtracted from the user's coordinates (already in metres).
     pub origin_m: DVec3,
     /// The rectangle on which the canopy repeats for ever; `None` for an isolated scene.
@@ -110,18 +115,49 @@ impl Canopy {
         self.triangles().map(|triangle| triangle.corners_m)
     }
 
-    /// What a triangle is made of.
-    pub fn material_of(&self, triangle: &Triangle) -> &Material {
-        &self.materials[triangle.material as usize]
+    /// What each material counts as.
+    pub fn kinds(&self) -> Vec<Kind> {
+        let kind = |material: &Material| match self.declared.get(material) {
+            Some(&declared) => declared,
+            None => material.kind(),
+        };
+        self.materials.iter().map(kind).collect()
     }
 
-    /// Whether each organ is of a plant: not all of it is soil.
+    /// Whether the lower faces of each material are the inside of something solid: of CAN's stems, unless they are
+    /// declared to be a structure, which has two faces.
+    pub fn solid(&self) -> Vec<bool> {
+        let kinds = self.kinds().into_iter().zip(&self.materials);
+        let solid = |(kind, material): (Kind, &Material)| {
+            matches!(material, Material::Stem { .. }) && kind != Kind::Structure
+        };
+        kinds.map(solid).collect()
+    }
+
+    /// Whether each organ is of a plant: some of it is leaf or stem.
     pub fn plants(&self) -> Vec<bool> {
-        let mut plant = vec![true; self.organs.len()];
+        let kinds = self.kinds();
+        let mut plant = vec![false; self.organs.len()];
         for triangle in self.triangles() {
-            plant[triangle.organ as usize] &= *self.material_of(&triangle) != Material::Soil;
+            plant[triangle.organ as usize] |= kinds[triangle.material as usize].is_plant();
         }
         plant
+    }
+
+    /// What each organ counts as; none where its triangles are of several kinds.
+    pub fn organ_kinds(&self) -> Vec<Option<Kind>> {
+        let kinds = self.kinds();
+        let mut found: Vec<Option<Option<Kind>>> = vec![None; self.organs.len()];
+        for triangle in self.triangles() {
+            let kind = Some(kinds[triangle.material as usize]);
+            let organ = &mut found[triangle.organ as usize];
+            *organ = Some(match organ {
+                None => kind,
+                Some(known) if *known == kind => kind,
+                Some(_) => None,
+            });
+        }
+        found.into_iter().map(Option::flatten).collect()
     }
 
     /// The corners of its box, without the soil plane; both zero where there is nothing.
@@ -135,13 +171,23 @@ impl Canopy {
     }
 }
 
-/// A group of triangles that is reported as one.
-#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+/// A group of triangles that is reported as one. No two organs of a canopy have the same species, plant and id.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Hash)]
 pub struct Organ {
-    /// As in the output: for CAN, plant * 1000 + leaf; for OBJ, the group's name.
-    pub id: String,
+    /// For CAN, the species number; for OBJ, the name of the file, which as a rule is one kind of plant.
+    pub species: String,
     /// The plant it belongs to: for CAN, the plant number; for OBJ, the object's name.
     pub plant: String,
+    /// As in the output: for CAN, plant * 1000 + leaf; for OBJ, the group's name.
+    pub id: String,
+}
+
+impl Organ {
+    /// CAN's soil: nobody's organ, which may be in several files.
+    pub fn soil() -> Self {
+        let [species, plant, id] = [(); 3].map(|()| "0".to_owned());
+        Self { species, plant, id }
+    }
 }
 
 /// What a triangle is made of; a band gives it optical properties.
@@ -161,6 +207,25 @@ pub enum Material {
     Soil,
     /// A material known by name (OBJ).
     Named(String),
+}
+
+impl Material {
+    /// What it counts as where nothing is declared.
+    pub fn kind(&self) -> Kind {
+        match self {
+            Self::Leaf { .. } | Self::Named(_) => Kind::Leaf,
+            Self::Stem { .. } => Kind::Stem,
+            Self::Soil => Kind::Soil,
+        }
+    }
+
+    /// The species that it is of, for CAN.
+    pub fn species(&self) -> Option<u32> {
+        match self {
+            Self::Leaf { species } | Self::Stem { species } => Some(*species),
+            Self::Soil | Self::Named(_) => None,
+        }
+    }
 }
 
 impl fmt::Display for Material {

@@ -69,10 +69,13 @@ impl Label {
 
     fn organ(self) -> Organ {
         // Soil is nobody's organ, whatever plant number its label has: it must not join a stem.
-        let plant = if self.is_soil() { 0 } else { self.plant };
+        if self.is_soil() {
+            return Organ::soil();
+        }
         Organ {
-            id: (plant * 1000 + self.leaf).to_string(),
-            plant: plant.to_string(),
+            species: self.species.to_string(),
+            plant: self.plant.to_string(),
+            id: (self.plant * 1000 + self.leaf).to_string(),
         }
     }
 }

@@ -88,6 +88,8 @@ impl Names {
         }
         let named = |name: &Option<String>| name.clone().unwrap_or_else(|| UNNAMED.to_owned());
         let organ = Organ {
+            // whoever knows the other files of the scene gives this one a name
+            species: String::new(),
             id: named(self.group.as_ref().map_or(&self.object, |_| &self.group)),
             plant: named(&self.object),
         };

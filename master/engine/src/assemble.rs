@@ -8,7 +8,8 @@ use crate::direct::Direct;
 use crate::exchange::Outlook;
 use crate::far_field::start::outer_soil_radiosity_W_m2;
 use crate::frame::Frame;
-use crate::solution::{Balance, Estimate, ItemLight, SoilMap, Solution};
+use crate::sinks::{SINKS, Sink};
+use crate::solution::{Balance, Estimate, ItemLight, MaterialLight, SoilMap, Solution};
 use crate::solver::{Irradiance, Variances};
 
 /// All that the results are put together from.
@@ -145,37 +146,56 @@ impl Parts<'_> {
 
     fn balance(&self, b: usize, solution: &Solution) -> Balance {
         let (bands, band) = (self.optics.len(), &self.optics.bands[b]);
-        let [mut plants, mut soil] = [0.0; 2];
-        for t in 0..self.frame.organ.len() {
+        let frame = self.frame;
+        let mut sinks = [0.0; SINKS];
+        let mut materials = vec![0.0; frame.kinds.len()];
+        for t in 0..frame.organ.len() {
             let absorbed = solution.triangles[t * bands + b].absorbed_W;
-            *(if self.frame.is_soil(t) {
-                &mut soil
-            } else {
-                &mut plants
-            }) += absorbed;
+            for &sink in Sink::of(frame.kind(t)) {
+                sinks[sink as usize] += absorbed;
+            }
+            materials[frame.material[t] as usize] += absorbed;
         }
-        for row in self.frame.ends.faces() as usize..self.frame.rows() {
-            soil += (1.0 - band.soil_albedo)
-                * self.frame.row_area_m2(row)
-                * self.irradiance_W_m2(row, b);
+        for row in frame.ends.faces() as usize..frame.rows() {
+            sinks[Sink::Soil as usize] +=
+                (1.0 - band.soil_albedo) * frame.row_area_m2(row) * self.irradiance_W_m2(row, b);
         }
         let [up, scattered_down] = self.solved(b).map_or([0.0; 2], |k| self.escaped_W(band, k));
-        let down = scattered_down + self.direct.passed_W[b];
+        sinks[Sink::Up as usize] = up;
+        sinks[Sink::Down as usize] = scattered_down + self.direct.passed_W[b];
         let incoming = self.direct.incoming_W[b] + self.outer_soil_W(b);
-        let mut variance = self.variances(b).map_or([0.0; 5], |v| v.balance_W2);
-        variance[4] += self.direct.closure_variance_W2[b];
-        let estimate = |value: f64, k: usize| Estimate {
+        let missing = |left: f64, sink: Sink| left - sinks[sink as usize];
+        let closure = Sink::WHOLE.into_iter().fold(incoming, missing);
+        let none = Variances::default();
+        let variances = self.variances(b).unwrap_or(&none);
+        let estimate = |value: f64, variance: f64| Estimate {
             value,
-            se: variance[k].sqrt(),
+            se: variance.sqrt(),
+        };
+        let of = |sink: Sink| estimate(sinks[sink as usize], variances.sinks_W2[sink as usize]);
+        let material = |(m, &absorbed): (usize, &f64)| MaterialLight {
+            name: frame.materials[m].clone(),
+            kind: frame.kinds[m],
+            absorbed_W: estimate(
+                absorbed,
+                variances.material_W2.get(m).copied().unwrap_or(0.0),
+            ),
         };
         Balance {
             band: band.name.clone(),
             incoming_W: incoming,
-            absorbed_plants_W: estimate(plants, 0),
-            absorbed_soil_W: estimate(soil, 1),
-            escaped_up_W: estimate(up, 2),
-            escaped_down_W: estimate(down, 3),
-            closure_W: estimate(incoming - plants - soil - up - down, 4),
+            absorbed_plants_W: of(Sink::Plants),
+            absorbed_leaves_W: of(Sink::Leaves),
+            absorbed_stems_W: of(Sink::Stems),
+            absorbed_structures_W: of(Sink::Structures),
+            absorbed_soil_W: of(Sink::Soil),
+            escaped_up_W: of(Sink::Up),
+            escaped_down_W: of(Sink::Down),
+            closure_W: estimate(
+                closure,
+                variances.closure_W2 + self.direct.closure_variance_W2[b],
+            ),
+            materials: materials.iter().enumerate().map(material).collect(),
         }
     }
 

@@ -25,6 +25,7 @@ pub mod plan;
 pub mod progress;
 pub mod rounds;
 pub mod run;
+mod sinks;
 pub mod solution;
 mod solve_error;
 pub mod solver;

@@ -1,6 +1,7 @@
 //! What a solve gives: light per organ, per triangle and per soil cell, and the energy balance.
 
 use glam::DVec2;
+use nestrad_common::canopy::Kind;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{Order, back};
@@ -51,8 +52,17 @@ pub struct Balance {
     pub band: String,
     /// What the sources bring, and in an open scene what the soil beyond its map sends.
     pub incoming_W: f64,
-    /// Absorbed by all triangles (soil triangles included in `absorbed_soil_W` instead).
+    /// Absorbed by plants: leaves and stems.
     pub absorbed_plants_W: Estimate,
+    /// The part of it that leaves absorb.
+    #[serde(default)]
+    pub absorbed_leaves_W: Estimate,
+    /// The part of it that stems absorb.
+    #[serde(default)]
+    pub absorbed_stems_W: Estimate,
+    /// Absorbed by what is declared to be a structure.
+    #[serde(default)]
+    pub absorbed_structures_W: Estimate,
     /// Absorbed by the soil plane and by soil triangles.
     pub absorbed_soil_W: Estimate,
     /// Leaves upwards to the sky.
@@ -61,6 +71,20 @@ pub struct Balance {
     pub escaped_down_W: Estimate,
     /// `incoming - absorbed - escaped`: what the estimate does not account for.
     pub closure_W: Estimate,
+    /// Absorbed by the triangles of each material, in the scene's order.
+    #[serde(default)]
+    pub materials: Vec<MaterialLight>,
+}
+
+/// What a material absorbs in a band.
+#[derive(Clone, Debug, Default, PartialEq, Deserialize, Serialize)]
+pub struct MaterialLight {
+    /// Its name, as in [`Material`](nestrad_common::canopy::Material).
+    pub name: String,
+    /// What it counts as.
+    pub kind: Kind,
+    /// By all of it, W.
+    pub absorbed_W: Estimate,
 }
 
 /// What the error of a band's organs comes from: each as the root mean square of [`OrganSpread`](crate::account::OrganSpread), percent.
@@ -141,7 +165,12 @@ impl Solution {
     /// The solution of a frame in that order, in the order of the canopy.
     pub(crate) fn in_order_of(self, order: &Order) -> Self {
         let bands = self.balance.len();
+        let mut balance = self.balance;
+        for band in &mut balance {
+            band.materials = back(&band.materials, &order.material, 1);
+        }
         Self {
+            balance,
             organs: back(&self.organs, &order.organ, bands),
             organ_bias_W: back(&self.organ_bias_W, &order.organ, bands),
             organ_area_m2: back(&self.organ_area_m2, &order.organ, 1),

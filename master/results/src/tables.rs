@@ -1,9 +1,12 @@
 //! The tables of a result: organs, triangles and soil cells, one row per item and band.
 
-use nestrad_common::canopy::Canopy;
+use nestrad_common::canopy::{Canopy, Kind};
 use nestrad_engine::solution::{Estimate, ItemLight, SoilMap, Solution};
 
 use crate::table::{Column, Table};
+
+/// The kind of an organ whose triangles are of several.
+const MIXED: &str = "mixed";
 
 /// One row per organ and band.
 pub(crate) fn organs<'a>(
@@ -13,13 +16,18 @@ pub(crate) fn organs<'a>(
 ) -> Table<'a> {
     let count = bands.len();
     let organ = move |row: usize| &canopy.organs[row / count];
+    let kinds = canopy.organ_kinds();
     let light = move |row: usize| &solution.organs[row];
     Table {
         name: "organs",
         rows: canopy.organs.len() * count,
         columns: vec![
+            Column::text("species", move |row| &organ(row).species),
             Column::text("plant", move |row| &organ(row).plant),
             Column::text("organ", move |row| &organ(row).id),
+            Column::text("kind", move |row| {
+                kinds[row / count].map_or(MIXED, Kind::name)
+            }),
             Column::quantity("area_m2", move |row| solution.organ_area_m2[row / count]),
             Column::text("band", move |row| bands[row % count]),
             Column::quantity("irradiance_upper_W_m2", move |row| {
@@ -44,14 +52,18 @@ pub(crate) fn triangles<'a>(
 ) -> Table<'a> {
     let count = bands.len();
     let organ = move |row: usize| &canopy.organs[canopy.triangle(row / count).organ as usize];
+    let kinds = canopy.kinds();
+    let kind = move |row: usize| kinds[canopy.triangle(row / count).material as usize];
     let light = move |row: usize| triangle_light_per_m2(solution, row / count, count, row % count);
     Table {
         name: "triangles",
         rows: canopy.len() * count,
         columns: vec![
             Column::index("triangle", move |row| row / count),
+            Column::text("species", move |row| &organ(row).species),
             Column::text("plant", move |row| &organ(row).plant),
             Column::text("organ", move |row| &organ(row).id),
+            Column::text("kind", move |row| kind(row).name()),
             Column::quantity("area_m2", move |row| solution.triangle_area_m2[row / count]),
             Column::text("band", move |row| bands[row % count]),
             Column::quantity("irradiance_upper_W_m2", move |row| {

@@ -2,19 +2,26 @@
 //!
 //! One line per band: what comes in and where it goes, each with its standard error, per m² of
 //! ground where there is a pattern and for the whole scene where there is none. Columns of what a
-//! scene does not have (soil, a void below) are left out. Five significant digits of the light that
-//! comes in are shown, or fewer where the table would not fit into 80 columns.
+//! scene does not have (structures, soil, a void below) are left out. Five significant digits of the light
+//! that comes in are shown, or fewer where the table would not fit into 80 columns. A second table says what
+//! each material absorbs, where there are several.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
 
-use nestrad_common::canopy::Canopy;
+use nestrad_common::canopy::{Canopy, Kind};
 use nestrad_common::figures::fixed;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::solution::{Balance, Estimate, Solution};
 use nestrad_engine::stopwatch::Usage;
 
 const COLUMNS: usize = 80;
+
+/// For the name of a material.
+const NAME_COLUMNS: usize = 24;
+
+/// More materials than this are not listed.
+const MOST_MATERIALS: usize = 12;
 
 /// Writes the energy balance of all bands, the standard error of organs, and what it cost.
 pub fn write(
@@ -36,7 +43,8 @@ fn flows(balance: &[Balance]) -> Vec<Flow> {
         ("plants", |b| b.absorbed_plants_W),
         ("reflected", |b| b.escaped_up_W),
     ];
-    let only_where_there_is_some: [Flow; 2] = [
+    let only_where_there_is_some: [Flow; 3] = [
+        ("structures", |b| b.absorbed_structures_W),
         ("soil", |b| b.absorbed_soil_W),
         ("lost below", |b| b.escaped_down_W),
     ];
@@ -70,9 +78,29 @@ fn write_balance(out: &mut impl Write, canopy: &Canopy, balance: &[Balance]) -> 
     };
     writeln!(out, "light in {}{per} (± one standard error)", unit.prefix)?;
 
-    let mut decimals = unit.decimals(largest);
+    let (decimals, divisor) = (unit.decimals(largest), unit.scale * area_m2);
+    write_table(out, decimals, |decimals| rows(balance, divisor, decimals))?;
+    let materials = balance.first().map_or(0, |band| band.materials.len());
+    if materials < 2 {
+        return Ok(());
+    }
+    if materials > MOST_MATERIALS {
+        let place = "energy_balance in summary.json";
+        return writeln!(out, "absorbed by each of {materials} materials: {place}");
+    }
+    write_table(out, decimals, |decimals| {
+        of_materials(balance, divisor, decimals)
+    })
+}
+
+/// As many decimals as fit into the columns there are.
+fn write_table(
+    out: &mut impl Write,
+    mut decimals: usize,
+    rows: impl Fn(usize) -> Vec<Vec<String>>,
+) -> io::Result<()> {
     loop {
-        let rows = rows(balance, unit.scale * area_m2, decimals);
+        let rows = rows(decimals);
         let widths = widths(&rows);
         let total = widths.iter().sum::<usize>() + 2 * (widths.len() - 1);
         if total <= COLUMNS || decimals == 0 {
@@ -94,17 +122,38 @@ fn rows(balance: &[Balance], divisor: f64, decimals: usize) -> Vec<Vec<String>> 
             shortened(&band.band),
             fixed(band.incoming_W / divisor, decimals),
         ];
-        row.extend(flows.iter().map(|(_, flow)| {
-            let Estimate { value, se } = flow(band);
-            format!(
-                "{} ±{}",
-                fixed(value / divisor, decimals),
-                fixed(se / divisor, decimals)
-            )
-        }));
+        let cell = |(_, flow): &Flow| with_error(flow(band), divisor, decimals);
+        row.extend(flows.iter().map(cell));
         rows.push(row);
     }
     rows
+}
+
+/// What each material absorbs, those of a kind together; the heading first.
+fn of_materials(balance: &[Balance], divisor: f64, decimals: usize) -> Vec<Vec<String>> {
+    let mut heading = vec!["absorbed by".to_owned(), "kind".to_owned()];
+    heading.extend(balance.iter().map(|band| shortened(&band.band)));
+    let mut rows = vec![heading];
+    let Some(first) = balance.first() else {
+        return rows;
+    };
+    for kind in Kind::ALL {
+        for (m, material) in first.materials.iter().enumerate() {
+            if material.kind != kind {
+                continue;
+            }
+            let mut row = vec![shortened_to(&material.name, NAME_COLUMNS), kind.to_string()];
+            let of_band = balance.iter().filter_map(|band| band.materials.get(m));
+            row.extend(of_band.map(|of| with_error(of.absorbed_W, divisor, decimals)));
+            rows.push(row);
+        }
+    }
+    rows
+}
+
+fn with_error(Estimate { value, se }: Estimate, divisor: f64, decimals: usize) -> String {
+    let [value, se] = [value, se].map(|x| fixed(x / divisor, decimals));
+    format!("{value} ±{se}")
 }
 
 fn widths(rows: &[Vec<String>]) -> Vec<usize> {
@@ -128,10 +177,14 @@ fn write_row(out: &mut impl Write, row: &[String], widths: &[usize]) -> io::Resu
 
 /// A band's name in twelve columns at most.
 fn shortened(name: &str) -> String {
-    if name.chars().count() <= 12 {
+    shortened_to(name, 12)
+}
+
+fn shortened_to(name: &str, columns: usize) -> String {
+    if name.chars().count() <= columns {
         return name.to_owned();
     }
-    name.chars().take(11).chain(['…']).collect()
+    name.chars().take(columns - 1).chain(['…']).collect()
 }
 
 /// A decimal multiple of the watt.
@@ -207,7 +260,7 @@ mod tests {
     use super::*;
     use glam::{DVec2, DVec3};
     use nestrad_common::canopy::{Material, Mesh, Organ, Pattern, Triangle};
-    use nestrad_engine::solution::ItemLight;
+    use nestrad_engine::solution::{ItemLight, MaterialLight};
 
     fn estimate(value: f64, se: f64) -> Estimate {
         Estimate { value, se }
@@ -222,14 +275,16 @@ mod tests {
             escaped_up_W: estimate(59.79 * factor, 0.24 * factor),
             escaped_down_W: estimate(0.0, 0.0),
             closure_W: estimate(-0.004 * factor, 0.02 * factor),
+            ..Balance::default()
         }
     }
 
     /// Two triangles: a leaf of 1 m², whose standard error is 0.5 %, and soil.
     fn canopy_and_solution(pattern: Option<Pattern>, balance: Vec<Balance>) -> (Canopy, Solution) {
         let organ = |id: &str| Organ {
-            id: id.into(),
+            species: "1".into(),
             plant: "1".into(),
+            id: id.into(),
         };
         let triangle = |number| Triangle {
             corners_m: [DVec3::ZERO; 3],
@@ -306,6 +361,36 @@ standard error of an organ, rms, of the mean: PAR 0.50 %
 1.23 s, 2.35 s of processor time, at most 300 MiB of memory
 ";
         assert_eq!(text, expected);
+    }
+
+    #[test]
+    fn fault_a_panel_and_a_film_were_plants() {
+        let material = |name: &str, kind, watts| MaterialLight {
+            name: name.into(),
+            kind,
+            absorbed_W: estimate(watts, 0.2),
+        };
+        let mut band = band("PAR", 1.0);
+        band.absorbed_plants_W = estimate(560.246, 0.3);
+        band.absorbed_structures_W = estimate(200.0, 0.3);
+        band.materials = vec![
+            material("leaf of species 1", Kind::Leaf, 500.0),
+            material("panel", Kind::Structure, 150.0),
+            material("stem of species 1", Kind::Stem, 60.246),
+            material("film of a greenhouse long ago", Kind::Structure, 50.0),
+        ];
+        let expected = "\
+light in W per m² of ground (± one standard error)
+band  incoming        plants    structures         soil    reflected     closure
+PAR     450.00  280.12 ±0.15  100.00 ±0.15  40.00 ±0.10  29.89 ±0.12  0.00 ±0.01
+absorbed by                    kind           PAR
+leaf of species 1              leaf  250.00 ±0.10
+stem of species 1              stem   30.12 ±0.10
+panel                     structure   75.00 ±0.10
+film of a greenhouse lo…  structure   25.00 ±0.10
+";
+        let text = shown(two_square_metres(), vec![band]);
+        assert!(text.starts_with(expected), "{text}");
     }
 
     #[test]

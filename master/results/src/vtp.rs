@@ -135,7 +135,7 @@ fn whole_number(name: &str) -> Option<i64> {
 mod tests {
     use super::*;
     use glam::DVec3;
-    use nestrad_common::canopy::{Mesh, Organ, Triangle};
+    use nestrad_common::canopy::{Material, Mesh, Organ, Triangle};
     use nestrad_engine::solution::ItemLight;
 
     const BAND: &str = "<\"blue\" & red>";
@@ -143,8 +143,9 @@ mod tests {
     /// Organ c of plant 12, organ a of plant 7: one is named by a number, the other is not.
     fn canopy_and_solution() -> (Canopy, Solution) {
         let organ = |id: &str, plant: &str| Organ {
-            id: id.into(),
+            species: "1".into(),
             plant: plant.into(),
+            id: id.into(),
         };
         let triangle = |(corners_m, organ)| Triangle {
             corners_m,
@@ -154,6 +155,7 @@ mod tests {
         let triangles = [([DVec3::ZERO, DVec3::X, DVec3::Y], 2), ([DVec3::Z; 3], 0)];
         let mut canopy = Canopy::of_meshes(vec![Mesh::from_iter(triangles.map(triangle))]);
         canopy.organs = vec![organ("a", "7"), organ("b", "7"), organ("é\"c", "12")];
+        canopy.materials = vec![Material::Stem { species: 1 }];
         canopy.origin_m = DVec3::new(10.0, 20.0, 30.0);
         let light = ItemLight {
             irradiance_upper_W_m2: 4.0,
@@ -257,8 +259,10 @@ mod tests {
             ),
             (named("absorbed_se_W_m2"), "Float32", bytes_of(&[0.5, 0.0])),
             ("triangle".into(), "Int64", whole(&[0, 1])),
+            ("species".into(), "Int64", whole(&[1, 1])),
             ("plant".into(), "Int64", whole(&[12, 7])),
             ("organ".into(), "String", b"\xc3\xa9\"c\0a\0".to_vec()),
+            ("kind".into(), "String", b"stem\0stem\0".to_vec()),
             ("area_m2".into(), "Float32", bytes_of(&[0.5, 0.0])),
         ];
         let found = arrays(&file);

@@ -4,7 +4,7 @@ use anyhow::Result;
 use clap::Args;
 use nestrad_common::assemble;
 use nestrad_common::figures::fixed;
-use nestrad_common::inspection::Inspection;
+use nestrad_common::inspection::{Inspection, MaterialFacts};
 use nestrad_common::light::Light;
 use nestrad_common::optics::FaceOptics;
 use nestrad_common::options::Options;
@@ -96,13 +96,14 @@ impl Facts {
                 None => "the box around the scene",
             };
             let index = fixed(index, 3);
-            let index = format!("{index} m², one-sided, without soil, per m² of {ground}");
+            let index = format!("{index} m² of leaves and stems, one-sided, per m² of {ground}");
             self.line("area", &index);
         }
         for material in &facts.materials {
             let (triangles, area_m2) = (material.triangles, material.area_m2);
             let area_m2 = fixed(area_m2, 4);
-            let text = format!("{}: {triangles} triangles, {area_m2} m²", material.name);
+            let MaterialFacts { name, kind, .. } = material;
+            let text = format!("{name}: {triangles} triangles, {area_m2} m², {kind}");
             self.line("material", &text);
         }
     }

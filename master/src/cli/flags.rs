@@ -7,7 +7,7 @@ use anyhow::Result;
 use clap::error::ErrorKind;
 use clap::{Args, ValueEnum};
 use nestrad_common::assemble;
-use nestrad_common::inputs::{BandInput, Inputs, LightInput, PatternInput};
+use nestrad_common::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
 use nestrad_common::light::Sky;
 use nestrad_common::options::{Options, Unit};
 
@@ -131,6 +131,8 @@ impl SceneFlags {
             unit: self.unit,
             pattern: self.pattern.clone().map(PatternInput::File),
             soil: self.soil,
+            // said in a scene file alone
+            kinds: KindsInput::default(),
             bands: bands.collect(),
             light: self.light()?,
             options,

@@ -6,6 +6,7 @@ mod checks;
 mod desk;
 mod generated;
 mod help;
+mod kinds;
 mod minus_zero;
 mod refusals;
 mod results;

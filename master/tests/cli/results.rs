@@ -37,12 +37,12 @@ fn tables_are_complete_and_finite() {
     for (table, head, rows) in [
         (
             &organs,
-            "plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W",
+            "species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W",
             3 * bands,
         ),
         (
             &triangles,
-            "triangle,plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W_m2,absorbed_direct_W_m2,absorbed_se_W_m2",
+            "triangle,species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W_m2,absorbed_direct_W_m2,absorbed_se_W_m2",
             4 * bands,
         ),
         (
@@ -61,7 +61,7 @@ fn tables_are_complete_and_finite() {
             assert_eq!(cells.len(), head.split(',').count(), "{line}");
             for (cell, name) in cells.iter().zip(head.split(',')) {
                 let number = cell.parse::<f64>();
-                let text = ["band", "plant", "organ"].contains(&name);
+                let text = ["band", "plant", "organ", "kind"].contains(&name);
                 assert!(text || number.is_ok_and(f64::is_finite), "{name}: {line}");
             }
         }
@@ -69,7 +69,7 @@ fn tables_are_complete_and_finite() {
     let ids: Vec<&str> = organs
         .lines()
         .skip(1)
-        .filter_map(|line| line.split(',').nth(1))
+        .filter_map(|line| line.split(',').nth(2))
         .collect();
     assert_eq!(ids, ["1000", "1000", "1001", "1001", "2001", "2001"]);
 }

@@ -51,15 +51,16 @@ fn set_up(venv: &Path) -> bool {
     }
 }
 
-/// Absorbed power by plant, organ and band, of one hour where a table has several.
-fn absorbed_W(text: &str, hour: &str) -> HashMap<[String; 3], f64> {
+/// Absorbed power by species, plant, organ and band, of one hour where a table has several.
+fn absorbed_W(text: &str, hour: &str) -> HashMap<[String; 4], f64> {
     let mut lines = text.lines();
     let names: Vec<&str> = lines.next().unwrap().split(',').collect();
     let column = |name: &str| names.iter().position(|n| *n == name);
     let rows = lines.map(|line| line.split(',').collect::<Vec<_>>());
     rows.filter(|row| column("hour").is_none_or(|h| row[h] == hour))
         .map(|row| {
-            let key = ["plant", "organ", "band"].map(|name| row[column(name).unwrap()].to_owned());
+            let key = ["species", "plant", "organ", "band"];
+            let key = key.map(|name| row[column(name).unwrap()].to_owned());
             (key, row[column("absorbed_W").unwrap()].parse().unwrap())
         })
         .collect()

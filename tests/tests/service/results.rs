@@ -45,6 +45,52 @@ fn a_scene_that_stands_alone_gives_the_same_bytes() {
 }
 
 #[test]
+fn species_and_kinds_travel_with_the_scene() {
+    let (desk, master) = (Desk::new(), Master::start(&[]));
+    let face = |x: f64, z: f64, material: &str| {
+        format!("v {x} 0.1 {z}\nv {x}5 0.1 {z}\nv {x} 0.9 {z}\nusemtl {material}\nf -3 -2 -1\n")
+    };
+    let tree = face(0.1, 0.4, "leaf") + &face(0.2, 0.3, "bark");
+    let house = face(0.4, 0.9, "panel") + &face(0.6, 0.0, "earth");
+    std::fs::write(desk.path("oak.obj"), &tree).unwrap();
+    std::fs::write(desk.path("house.obj"), tree + &house).unwrap();
+    let green = "leaf = { rho = 0.1, tau = 0.05 }\nbark = { rho = 0.3, tau = 0.1 }\n\
+                 panel = { rho = 0.1, tau = 0.7 }\nearth = { rho = 0.2 }\n";
+    let scene = desk.path("scene.toml");
+    let text = std::fs::read_to_string(&scene).unwrap();
+    let text =
+        text.replace(
+            "\"plants.can\"",
+            "[\"plants.can\", \"oak.obj\", \"house.obj\"]",
+        )
+        .replace(
+            "par.opt\"\n",
+            &format!("par.opt\"\n[bands.materials]\n{green}"),
+        )
+        .replace(
+            "nir.opt\"\n",
+            &format!("nir.opt\"\n[bands.materials]\n{green}"),
+        ) + "[kinds]\nmaterials = { bark = \"stem\", panel = \"structure\", earth = \"soil\" }\n";
+    std::fs::write(&scene, text).unwrap();
+    desk.compare("scene.toml", &[], &master);
+    let [here, there] = ["here", "there"].map(|out| {
+        let text = std::fs::read_to_string(desk.path(out).join("summary.json")).unwrap();
+        serde_json::from_str::<serde_json::Value>(&text).unwrap()
+    });
+    for section in ["energy_balance", "error_estimates", "scene"] {
+        assert_eq!(here[section], there[section], "{section}");
+    }
+    let table = std::fs::read_to_string(desk.path("there/organs.csv")).unwrap();
+    for row in [
+        "\n1,1,1000,stem,",
+        "\noak,default,default,mixed,",
+        "\nhouse,",
+    ] {
+        assert!(table.contains(row), "{row}: {table}");
+    }
+}
+
+#[test]
 fn the_summary_has_what_the_master_says() {
     let (desk, master) = (Desk::new(), Master::start(&[]));
     let output = desk.done(&[

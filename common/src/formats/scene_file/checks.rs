@@ -10,10 +10,10 @@ use super::super::error::FormatError;
 use super::super::pattern::{Rectangle, refused};
 use super::Text;
 use super::tables::{
-    BandTable, FaceTable, LightTable, LightText, MaterialTable, OneOrMany, PatternText, SceneFile,
-    SkyKind, SkyTable, TimeText,
+    BandTable, FaceTable, KindsTable, LightTable, LightText, MaterialTable, OneOrMany, PatternText,
+    SceneFile, SkyKind, SkyTable, TimeText,
 };
-use crate::inputs::{BandInput, Inputs, LightInput, PatternInput};
+use crate::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
 use crate::light::Sky;
 use crate::optics::{FaceOptics, LeafOptics};
 
@@ -38,6 +38,7 @@ pub(super) fn inputs(
         checked.map_err(|fault| text.message(&options.span(), fault))?;
     }
     let pattern = file.pattern.map(|given| pattern(given, text, folder));
+    let kinds = file.kinds.map(|given| kinds(given, text));
     let bands = file.bands.into_iter();
     let bands = bands.map(|given| band(given, text, folder));
     let light = file.light.map(|given| light(given, text, folder));
@@ -46,6 +47,7 @@ pub(super) fn inputs(
         unit: file.unit,
         pattern: pattern.transpose()?,
         soil: file.soil.map(Spanned::into_inner),
+        kinds: kinds.transpose()?.unwrap_or_default(),
         bands: bands.collect::<Result<_, _>>()?,
         light: light.transpose()?,
         options: file.options.map(Spanned::into_inner).unwrap_or_default(),
@@ -65,6 +67,21 @@ fn pattern(
         }
         PatternText::Corners(corners) => Err(refused(text.place(&span), corners)),
     }
+}
+
+fn kinds(given: Spanned<KindsTable>, text: &Text<'_>) -> Result<KindsInput, FormatError> {
+    let span = given.span();
+    let KindsTable { materials, species } = given.into_inner();
+    let number = |given: String| match given.parse() {
+        Ok(number) if number > 0 => Ok(number),
+        _ => Err(text.fault(&span, "numbers from 1 for species", given)),
+    };
+    let species = species.into_iter();
+    let species = species.map(|(given, kind)| Ok((number(given)?, kind)));
+    Ok(KindsInput {
+        materials,
+        species: species.collect::<Result<_, FormatError>>()?,
+    })
 }
 
 fn band(

@@ -18,6 +18,10 @@
 //! bark = { rho = 0.4 }
 //! leaf = { upper = { rho = 0.44, tau = 0.45 }, lower = { rho = 0.46, tau = 0.44 } }
 //!
+//! [kinds]                             # what counts as what in balance and tables
+//! materials = { bark = "stem", bench = "structure" }      # of OBJ, which else are leaves
+//! species = { 3 = "structure" }                           # of CAN
+//!
 //! [options]
 //! accuracy_percent = 0.5
 //! ```

@@ -9,6 +9,7 @@ use serde::de::value::MapAccessDeserializer;
 use serde::de::{self, Deserializer, MapAccess, Visitor};
 use toml::Spanned;
 
+use crate::canopy::Kind;
 use crate::options::{Options, Unit};
 
 #[derive(Deserialize)]
@@ -18,6 +19,7 @@ pub(super) struct SceneFile {
     pub(super) unit: Option<Unit>,
     pub(super) pattern: Option<Spanned<PatternText>>,
     pub(super) soil: Option<Spanned<f64>>,
+    pub(super) kinds: Option<Spanned<KindsTable>>,
     #[serde(default)]
     pub(super) bands: Vec<Spanned<BandTable>>,
     pub(super) light: Option<Spanned<LightText>>,
@@ -37,6 +39,16 @@ pub(super) enum OneOrMany {
 pub(super) enum PatternText {
     File(PathBuf),
     Corners([f64; 4]),
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct KindsTable {
+    #[serde(default)]
+    pub(super) materials: BTreeMap<String, Kind>,
+    /// Keys of a TOML table are text.
+    #[serde(default)]
+    pub(super) species: BTreeMap<String, Kind>,
 }
 
 #[derive(Deserialize)]

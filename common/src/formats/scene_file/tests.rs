@@ -209,6 +209,14 @@ fn what_is_wrong_is_named_with_its_line() {
         ),
         ("[[bands]]\n", "a.toml, line 1: missing field `name`"),
         (
+            "\n[kinds]\nmaterials = { panel = 'glass' }\n",
+            "a.toml, line 3: unknown variant `glass`, expected one of `leaf`, `stem`, `structure`, `soil`",
+        ),
+        (
+            "[kinds]\nspecies = { 0 = 'soil' }\n",
+            "a.toml, line 1: expected numbers from 1 for species, found 0",
+        ),
+        (
             "[[bands]]\nname = 'A'\nsoil_albedo = 1.1\n",
             "a.toml, line 3: expected an albedo from 0 to 1, found 1.1",
         ),

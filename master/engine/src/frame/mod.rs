@@ -7,7 +7,7 @@ mod order;
 use std::sync::Arc;
 
 use glam::DVec3;
-use nestrad_common::canopy::{Canopy, Material, Pattern};
+use nestrad_common::canopy::{Canopy, Kind, Material, Pattern};
 use nestrad_common::geometry;
 use nestrad_common::optics::{Band, LeafOptics, Optics};
 use nestrad_kernel::above::Above;
@@ -48,8 +48,12 @@ pub struct Frame {
     pub material: Vec<u32>,
     /// Number of organs.
     pub organs: usize,
-    /// What triangles are made of.
-    pub materials: Vec<Material>,
+    /// Names of what triangles are made of.
+    pub materials: Vec<String>,
+    /// What each material counts as.
+    pub kinds: Vec<Kind>,
+    /// Whether the lower faces of each material are the inside of something solid.
+    solid: Vec<bool>,
     /// The rectangle on which the canopy repeats, if it does.
     pub pattern: Option<Pattern>,
     /// The triangle of each element.
@@ -79,7 +83,10 @@ impl Frame {
             far: cut.far.clone(),
         };
         let (organ, material) = order.numbers(canopy);
-        let materials = order.materials(canopy);
+        let materials: Vec<String> = canopy.materials.iter().map(Material::to_string).collect();
+        let materials = order.by_material(&materials);
+        let kinds = order.by_material(&canopy.kinds());
+        let solid = order.by_material(&canopy.solid());
         let mut area_m2 = Vec::with_capacity(elements.len());
         for (triangle, &n) in soup.triangles().zip(&elements.divisions) {
             let pieces = n * n;
@@ -91,7 +98,7 @@ impl Frame {
             skipped_elements: 0,
             divisions: elements.divisions[t],
             owned: true,
-            solid: is_solid(&materials[material[t] as usize]),
+            solid: solid[material[t] as usize],
         });
         let ends = world.ends();
         let whole = BlockFrame {
@@ -108,6 +115,8 @@ impl Frame {
             organ,
             material,
             materials,
+            kinds,
+            solid,
             area_m2,
             ends,
             world,
@@ -138,19 +147,19 @@ impl Frame {
     /// Whether the lower face of a triangle is the inside of something solid: what is buried there gets and gives
     /// no light.
     pub fn is_solid(&self, triangle: usize) -> bool {
-        is_solid(&self.materials[self.material[triangle] as usize])
+        self.solid[self.material[triangle] as usize]
     }
 
-    /// Whether a triangle is soil.
-    pub fn is_soil(&self, triangle: usize) -> bool {
-        self.materials[self.material[triangle] as usize] == Material::Soil
+    /// What a triangle counts as.
+    pub fn kind(&self, triangle: usize) -> Kind {
+        self.kinds[self.material[triangle] as usize]
     }
 
-    /// Whether each organ is of a plant: not all of it is soil.
+    /// Whether each organ is of a plant: some of it is leaf or stem.
     pub fn plants(&self) -> Vec<bool> {
-        let mut plant = vec![true; self.organs];
+        let mut plant = vec![false; self.organs];
         for (t, &organ) in self.organ.iter().enumerate() {
-            plant[organ as usize] &= !self.is_soil(t);
+            plant[organ as usize] |= self.kind(t).is_plant();
         }
         plant
     }
@@ -215,11 +224,6 @@ impl Frame {
             }
         }
     }
-}
-
-/// CAN's opaque organs (leaf 0) are the surfaces of solid stems.
-fn is_solid(material: &Material) -> bool {
-    matches!(material, Material::Stem { .. })
 }
 
 /// Runs of one triangle each, those that go on with the one before joined to it.

@@ -7,7 +7,7 @@
 use std::cmp::Ordering;
 
 use glam::DVec3;
-use nestrad_common::canopy::{Canopy, Material, Organ, Triangle};
+use nestrad_common::canopy::{Canopy, Organ, Triangle};
 use nestrad_common::optics::{Band, Optics};
 use rayon::prelude::*;
 
@@ -18,7 +18,8 @@ pub struct Order {
     pub triangle: Vec<u32>,
     /// Of each sorted organ, its number in the canopy.
     pub organ: Vec<u32>,
-    material: Vec<u32>,
+    /// Of each sorted material, its number in the canopy.
+    pub material: Vec<u32>,
 }
 
 impl Order {
@@ -73,15 +74,15 @@ impl Order {
         self.triangles(canopy).map(numbers).unzip()
     }
 
-    /// The materials of the canopy, sorted.
-    pub fn materials(&self, canopy: &Canopy) -> Vec<Material> {
-        taken(&canopy.materials, &self.material)
+    /// What stands in the order of the canopy's materials, sorted.
+    pub fn by_material<T: Clone>(&self, of_canopy: &[T]) -> Vec<T> {
+        taken(of_canopy, &self.material)
     }
 
     /// Optics of the canopy for its sorted materials.
     pub fn optics(&self, optics: &Optics) -> Optics {
         let band = |band: &Band| Band {
-            materials: taken(&band.materials, &self.material),
+            materials: self.by_material(&band.materials),
             ..band.clone()
         };
         Optics {
@@ -114,10 +115,13 @@ fn middle([a, b, c]: &[DVec3; 3]) -> DVec3 {
     *a + *b + *c
 }
 
-/// Numbers by value, and other names by length first.
+/// Numbers by value, and other names by length first. Species come last: a name, which may be that of a file, tells
+/// apart what would be the same without it, and has no say in the order of the rest.
 fn compared(a: &Organ, b: &Organ) -> Ordering {
     let short_first = |a: &str, b: &str| a.len().cmp(&b.len()).then_with(|| a.cmp(b));
-    short_first(&a.plant, &b.plant).then_with(|| short_first(&a.id, &b.id))
+    short_first(&a.plant, &b.plant)
+        .then_with(|| short_first(&a.id, &b.id))
+        .then_with(|| short_first(&a.species, &b.species))
 }
 
 fn by_vertices(a: &[DVec3; 3], b: &[DVec3; 3]) -> Ordering {

@@ -92,6 +92,7 @@ mod tests {
         let organ = Organ {
             id: "leaf".to_owned(),
             plant: "plant".to_owned(),
+            ..Organ::default()
         };
         let leaf = |(organ, at)| {
             halves(at).map(|corners_m| Triangle {

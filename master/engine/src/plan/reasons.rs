@@ -1,6 +1,6 @@
 //! The plan in words, one line each, with the reason.
 
-use nestrad_common::canopy::{Canopy, Material};
+use nestrad_common::canopy::{Canopy, Kind};
 use nestrad_common::options::Diameter;
 
 use super::{Estimator, Plan, Settings};
@@ -102,9 +102,10 @@ fn field(canopy: &Canopy, settings: &Settings, plan: &Plan) -> String {
 }
 
 fn faces(canopy: &Canopy) -> String {
-    let solid = canopy
-        .triangles()
-        .filter(|t| matches!(canopy.material_of(t), Material::Stem { .. }))
+    let of_material = canopy.solid();
+    let triangles = canopy.triangles();
+    let solid = triangles
+        .filter(|t| of_material[t.material as usize])
         .count();
     format!(
         "faces: two for each of {} triangles; {solid} of them enclose something solid, where leaves that stick in it are dark",
@@ -113,9 +114,10 @@ fn faces(canopy: &Canopy) -> String {
 }
 
 fn soil(canopy: &Canopy, plan: &Plan) -> String {
-    let triangles = canopy
-        .triangles()
-        .filter(|t| *canopy.material_of(t) == Material::Soil)
+    let kinds = canopy.kinds();
+    let triangles = canopy.triangles();
+    let triangles = triangles
+        .filter(|t| kinds[t.material as usize] == Kind::Soil)
         .count();
     let plane = match canopy.soil_z_m {
         Some(_) => format!(

@@ -148,6 +148,7 @@ mod tests {
         let organ = Organ {
             id: "leaf".to_owned(),
             plant: "plant".to_owned(),
+            ..Organ::default()
         };
         let triangle = |organ| Triangle {
             corners_m: [DVec3::ZERO; 3],

@@ -1,6 +1,6 @@
 //! The sizes in a scene that sampling follows.
 
-use nestrad_common::canopy::{Canopy, Material, Triangle};
+use nestrad_common::canopy::{Canopy, Kind, Triangle};
 use nestrad_common::geometry;
 use rayon::prelude::*;
 use serde::Serialize;
@@ -31,7 +31,8 @@ pub struct Scale {
 impl Scale {
     /// Measures a scene; soil triangles count only where there is nothing else.
     pub fn of(canopy: &Canopy) -> Self {
-        let is_soil = |t: &Triangle| *canopy.material_of(t) == Material::Soil;
+        let kinds = canopy.kinds();
+        let is_soil = |t: &Triangle| kinds[t.material as usize] == Kind::Soil;
         let only_soil = canopy.triangles().all(|t| is_soil(&t));
         let counts = |t: &Triangle| only_soil || !is_soil(t);
         // summed by size, so that the order of the input leaves no trace in the rounding

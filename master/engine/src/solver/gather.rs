@@ -65,7 +65,7 @@ impl<'a, const N: usize> Gather<'a, N> {
         let lane = |value: &dyn Fn(usize) -> f64| {
             std::array::from_fn(|k| bands.get(k).map_or(0.0, |&b| value(b)))
         };
-        let materials = (0..frame.materials.len())
+        let materials = (0..frame.kinds.len())
             .map(|m| {
                 let of = |b: usize| optics.bands[b].materials[m];
                 Scatter {

@@ -20,6 +20,7 @@ use super::lane::{Lane, PULLED_TOGETHER, PULLS, Pull};
 use super::prefetch::prefetch;
 use super::system::{System, Variances};
 use crate::exchange::{HALF_BATCHES, HalfRows};
+use crate::sinks::{SINKS, Sink};
 
 /// A number for each batch.
 type PerBatch = [f64; HALF_BATCHES];
@@ -195,7 +196,8 @@ impl Spread<'_> {
         sum.soil_W2_m4.resize(frame.rows() - 2 * elements, 0.0);
         sum.organ_W2.resize(frame.organs, 0.0);
         let mut organs = vec![[0.0; HALF_BATCHES]; frame.organs];
-        let mut balance = [[0.0; HALF_BATCHES]; 4];
+        let mut balance = [[0.0; HALF_BATCHES]; SINKS];
+        let mut materials = vec![[0.0; HALF_BATCHES]; frame.kinds.len()];
         for (t, first) in frame.elements().first.windows(2).enumerate() {
             let optics = band.materials[frame.material[t] as usize];
             let faces = [optics.upper, optics.lower];
@@ -208,44 +210,54 @@ impl Spread<'_> {
                 self.escape(&mut balance, row, opposite.tau * area, &at(row ^ 1));
             }
             add(&mut organs[frame.organ[t] as usize], 1.0, &absorbed);
-            add(&mut balance[usize::from(frame.is_soil(t))], 1.0, &absorbed);
+            for &sink in Sink::of(frame.kind(t)) {
+                add(&mut balance[sink as usize], 1.0, &absorbed);
+            }
+            add(&mut materials[frame.material[t] as usize], 1.0, &absorbed);
             sum.triangle_W2[t] += variance(&absorbed);
         }
         for row in 2 * elements..irradiance.len() {
             let (cell, pull) = (row - 2 * elements, at(row));
             let area = self.exposed_area_m2(row);
-            add(&mut balance[1], (1.0 - band.soil_albedo) * area, &pull);
+            let absorbed = (1.0 - band.soil_albedo) * area;
+            add(&mut balance[Sink::Soil as usize], absorbed, &pull);
             self.escape(&mut balance, row, band.soil_albedo * area, &pull);
             sum.soil_W2_m4[cell] += variance(&pull);
         }
         if self.system.far.is_some() {
             let ground_m2 = frame.world.ground_area_m2();
-            for (balance, leaving) in balance[2..].iter_mut().zip(leaving) {
-                *balance = pull(leaving).map(|x| ground_m2 * x);
+            for (sink, leaving) in [Sink::Up, Sink::Down].into_iter().zip(leaving) {
+                balance[sink as usize] = pull(leaving).map(|x| ground_m2 * x);
             }
         }
         for (sum, organ) in sum.organ_W2.iter_mut().zip(&organs) {
             *sum += variance(organ);
         }
-        let mut closure = [0.0; HALF_BATCHES];
-        for (k, part) in balance.iter().enumerate() {
-            sum.balance_W2[k] += variance(part);
-            add(&mut closure, 1.0, part);
+        sum.material_W2.resize(materials.len(), 0.0);
+        for (sum, material) in sum.material_W2.iter_mut().zip(&materials) {
+            *sum += variance(material);
         }
-        sum.balance_W2[4] += variance(&closure);
+        for (sum, part) in sum.sinks_W2.iter_mut().zip(&balance) {
+            *sum += variance(part);
+        }
+        let mut closure = [0.0; HALF_BATCHES];
+        for sink in Sink::WHOLE {
+            add(&mut closure, 1.0, &balance[sink as usize]);
+        }
+        sum.closure_W2 += variance(&closure);
     }
 
     fn exposed_area_m2(&self, row: usize) -> f64 {
         self.system.frame.row_area_m2(row) * self.system.outlook.exposed[row]
     }
 
-    fn escape(&self, balance: &mut [PerBatch; 4], row: usize, weight: f64, change: &PerBatch) {
+    fn escape(&self, balance: &mut [PerBatch; SINKS], row: usize, weight: f64, change: &PerBatch) {
         let outlook = self.system.outlook;
         let part = |of: &dyn Fn(usize) -> f64| 0.5 * (of(0) + of(1));
         let to_sky = part(&|half| outlook.to_sky[half][row]);
         let to_void = part(&|half| outlook.to_void(half, row));
-        add(&mut balance[2], weight * to_sky, change);
-        add(&mut balance[3], weight * to_void, change);
+        add(&mut balance[Sink::Up as usize], weight * to_sky, change);
+        add(&mut balance[Sink::Down as usize], weight * to_void, change);
     }
 }
 

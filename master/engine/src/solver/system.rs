@@ -5,6 +5,7 @@ use nestrad_common::optics::Optics;
 use super::groups::Groups;
 use crate::exchange::{Exchange, FarRows, Outlook};
 use crate::frame::Frame;
+use crate::sinks::SINKS;
 
 /// What is to be solved.
 #[derive(Clone, Copy)]
@@ -88,9 +89,12 @@ pub struct Variances {
     pub organ_W2: Vec<f64>,
     /// Of the irradiance of each soil cell, (W m⁻²)².
     pub soil_W2_m4: Vec<f64>,
-    /// Of the power that plants absorb, that soil absorbs, that leaves upwards and downwards, and of
-    /// what is missing in their sum, W².
-    pub balance_W2: [f64; 5],
+    /// Of the power that each material absorbs, W².
+    pub material_W2: Vec<f64>,
+    /// Of the power that goes to each sink: plants, soil, the sky and so on, W².
+    pub sinks_W2: [f64; SINKS],
+    /// Of what is missing in their sum, W².
+    pub closure_W2: f64,
 }
 
 /// A change of the power that organs absorb in one band, if the model were another.

@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::{DVec2, DVec3};
-use nestrad_common::canopy::{Mesh, Organ, Pattern, Triangle};
+use nestrad_common::canopy::{Kind, Material, Mesh, Organ, Pattern, Triangle};
 use nestrad_engine::solution::{Estimate, ItemLight, SoilMap};
 
 use super::*;
@@ -18,8 +18,9 @@ fn canopy() -> Canopy {
 /// The same with triangles that are of these organs.
 fn canopy_of_organs(organs: [u32; 2]) -> Canopy {
     let organ = |id: &str, plant: &str| Organ {
-        id: id.into(),
+        species: "3".into(),
         plant: plant.into(),
+        id: id.into(),
     };
     let leaf = [
         DVec3::ZERO,
@@ -29,11 +30,14 @@ fn canopy_of_organs(organs: [u32; 2]) -> Canopy {
     let triangle = |(corners_m, organ)| Triangle {
         corners_m,
         organ,
-        material: 0,
+        material: u32::from(organ == 0),
     };
     let triangles = [(leaf, organs[0]), ([DVec3::ONE; 3], organs[1])];
     let mut canopy = Canopy::of_meshes(vec![Mesh::from_iter(triangles.map(triangle))]);
     canopy.organs = vec![organ("leaf 1, \"flag\"", "2"), organ("1001", "1")];
+    let panel = Material::Named("panel".to_owned());
+    canopy.materials = vec![Material::Leaf { species: 3 }, panel.clone()];
+    canopy.declared = [(panel, Kind::Structure)].into();
     canopy.origin_m = DVec3::new(500_000.25, 100.0, -1.0);
     canopy.pattern = Some(Pattern {
         min_m: DVec2::ZERO,
@@ -126,20 +130,20 @@ fn tables_byte_for_byte() {
     );
     assert_eq!(
         read("organs.csv"),
-        r#"plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W
-2,"leaf 1, ""flag""",0.0,PAR,0.0,0.0,0.0,0.0,0.0,0.0
-2,"leaf 1, ""flag""",0.0,NIR,0.0,0.0,0.0,0.0,0.0,0.0
-1,1001,0.625,PAR,300.0,20.0,33.3333333,30.0,0.125,0.25
-1,1001,0.625,NIR,30.0,2.0,3.33333333,3.0,0.0125,0.0
+        r#"species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W
+3,2,"leaf 1, ""flag""",structure,0.0,PAR,0.0,0.0,0.0,0.0,0.0,0.0
+3,2,"leaf 1, ""flag""",structure,0.0,NIR,0.0,0.0,0.0,0.0,0.0,0.0
+3,1,1001,leaf,0.625,PAR,300.0,20.0,33.3333333,30.0,0.125,0.25
+3,1,1001,leaf,0.625,NIR,30.0,2.0,3.33333333,3.0,0.0125,0.0
 "#
     );
     assert_eq!(
         read("triangles.csv"),
-        r#"triangle,plant,organ,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W_m2,absorbed_direct_W_m2,absorbed_se_W_m2
-0,1,1001,0.625,PAR,300.0,20.0,53.3333333,48.0,0.2
-0,1,1001,0.625,NIR,30.0,2.0,5.33333333,4.8,0.02
-1,2,"leaf 1, ""flag""",0.0,PAR,0.0,0.0,0.0,0.0,0.0
-1,2,"leaf 1, ""flag""",0.0,NIR,0.0,0.0,0.0,0.0,0.0
+        r#"triangle,species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W_m2,absorbed_direct_W_m2,absorbed_se_W_m2
+0,3,1,1001,leaf,0.625,PAR,300.0,20.0,53.3333333,48.0,0.2
+0,3,1,1001,leaf,0.625,NIR,30.0,2.0,5.33333333,4.8,0.02
+1,3,2,"leaf 1, ""flag""",structure,0.0,PAR,0.0,0.0,0.0,0.0,0.0
+1,3,2,"leaf 1, ""flag""",structure,0.0,NIR,0.0,0.0,0.0,0.0,0.0
 "#
     );
     assert_eq!(

@@ -100,11 +100,10 @@ pub(crate) struct SpreadFacts {
 /// An organ and its light.
 #[derive(Clone, Debug, Serialize)]
 pub(crate) struct Organ {
-    /// Where the tables have it.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub(crate) species: Option<String>,
+    pub(crate) species: String,
     pub(crate) plant: String,
     pub(crate) organ: String,
+    pub(crate) kind: String,
     pub(crate) area_m2: f64,
     /// Per band.
     pub(crate) light: Vec<OrganLight>,
@@ -126,6 +125,8 @@ pub(crate) struct Triangles {
     pub(crate) area_m2: Vec<f64>,
     /// Index of its organ in the table of organs.
     pub(crate) organ: Vec<u32>,
+    /// Whether it is a part of a plant.
+    pub(crate) plant: Vec<bool>,
     /// Bands of a triangle one after the other.
     pub(crate) light: Vec<PatchLight>,
 }
@@ -151,6 +152,9 @@ pub(crate) struct Results {
     pub(crate) triangles: Triangles,
     pub(crate) soil: Option<Soil>,
 }
+
+/// Kinds that are parts of plants.
+const PLANTS: [&str; 2] = ["leaf", "stem"];
 
 /// Reads a folder of results.
 pub(crate) fn read(folder: &Path) -> Result<Results, ReportError> {
@@ -195,13 +199,12 @@ fn summary(folder: &Path) -> Result<SummaryFacts, ReportError> {
     read.map_err(|source| ReportError::Summary { path, source })
 }
 
-/// Tables of some versions have it, of others not.
-const SPECIES: &str = "species";
-
 fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
-    let mut columns = vec![
+    let columns = [
+        "species",
         "plant",
         "organ",
+        "kind",
         "area_m2",
         "band",
         "irradiance_upper_W_m2",
@@ -213,26 +216,25 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
     let mut organs: Vec<Organ> = Vec::new();
     let mut rows = 0;
     let table = Table::open(folder, "organs")?;
-    let species = table.has(SPECIES).then_some(columns.len());
-    columns.extend(species.map(|_| SPECIES));
     table.rows(&columns, |row| {
-        row.must_be(3, &bands[rows % bands.len()])?;
+        row.must_be(5, &bands[rows % bands.len()])?;
         if rows.is_multiple_of(bands.len()) {
             organs.push(Organ {
-                species: species.map(|column| row.text(column).into_owned()),
-                plant: row.text(0).into_owned(),
-                organ: row.text(1).into_owned(),
-                area_m2: row.real(2)?,
+                species: row.text(0).into_owned(),
+                plant: row.text(1).into_owned(),
+                organ: row.text(2).into_owned(),
+                kind: row.text(3).into_owned(),
+                area_m2: row.real(4)?,
                 light: Vec::with_capacity(bands.len()),
             });
         }
         if let Some(organ) = organs.last_mut() {
             organ.light.push(OrganLight {
-                upper_W_m2: row.real(4)?,
-                lower_W_m2: row.real(5)?,
-                absorbed_W: row.real(6)?,
-                direct_W: row.real(7)?,
-                se_W: row.real(8)?,
+                upper_W_m2: row.real(6)?,
+                lower_W_m2: row.real(7)?,
+                absorbed_W: row.real(8)?,
+                direct_W: row.real(9)?,
+                se_W: row.real(10)?,
             });
         }
         rows += 1;
@@ -245,10 +247,12 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
 }
 
 fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triangles, ReportError> {
-    let mut columns = vec![
+    let columns = [
         "triangle",
+        "species",
         "plant",
         "organ",
+        "kind",
         "area_m2",
         "band",
         "irradiance_upper_W_m2",
@@ -256,18 +260,17 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
         "absorbed_W_m2",
         "absorbed_direct_W_m2",
     ];
+    let names = organs.iter().map(|organ| {
+        let Organ {
+            species,
+            plant,
+            organ,
+            ..
+        } = organ;
+        [species, plant, organ].map(String::as_str)
+    });
+    let by_name: HashMap<[&str; 3], u32> = names.zip(0..).collect();
     let table = Table::open(folder, "triangles")?;
-    let species = table.has(SPECIES).then_some(columns.len());
-    columns.extend(species.map(|_| SPECIES));
-    let name = |organ: &Organ| {
-        (
-            organ.species.clone(),
-            organ.plant.clone(),
-            organ.organ.clone(),
-        )
-    };
-    let by_name: HashMap<(Option<String>, String, String), u32> =
-        organs.iter().map(name).zip(0..).collect();
     let mut found = Triangles::default();
     table.rows(&columns, |row| {
         let (triangle, band) = (
@@ -277,20 +280,20 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
         if row.index(0)? != triangle {
             return Err(row.not(&format!("triangle {triangle}"), &row.text(0)));
         }
-        row.must_be(4, &bands[band])?;
+        row.must_be(6, &bands[band])?;
         if band == 0 {
-            let species = species.map(|column| row.text(column).into_owned());
-            let name = (species, row.text(1).into_owned(), row.text(2).into_owned());
-            let organ = by_name.get(&name).copied();
+            let name = [1, 2, 3].map(|column| row.text(column));
+            let organ = by_name.get(&name.each_ref().map(|name| &**name)).copied();
             let organ =
-                organ.ok_or_else(|| row.not("an organ of the table of organs", &row.text(2)))?;
+                organ.ok_or_else(|| row.not("an organ of the table of organs", &row.text(3)))?;
             found.organ.push(organ);
-            found.area_m2.push(row.real(3)?);
+            found.plant.push(PLANTS.contains(&&*row.text(4)));
+            found.area_m2.push(row.real(5)?);
         }
         found.light.push(PatchLight {
-            irradiance_W_m2: row.real(5)? + row.real(6)?,
-            absorbed_W_m2: row.real(7)?,
-            direct_W_m2: row.real(8)?,
+            irradiance_W_m2: row.real(7)? + row.real(8)?,
+            absorbed_W_m2: row.real(9)?,
+            direct_W_m2: row.real(10)?,
         });
         Ok(())
     })?;

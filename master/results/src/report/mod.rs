@@ -14,7 +14,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use nestrad_common::assemble::load_canopy;
-use nestrad_common::canopy::{Canopy, Material};
+use nestrad_common::canopy::Canopy;
 use nestrad_common::geometry;
 use nestrad_common::inputs::Inputs;
 use nestrad_engine::solution::{Balance, BandAccount};
@@ -140,7 +140,7 @@ pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
     if let Some((path, band)) = picture {
         write_picture(path, &canopy, &results, band, &scales[band])?;
     }
-    let plants = canopy.plants();
+    let plants = plants(&results);
     let title = title(&summary.options.scenes);
     let facts = Facts {
         title: &title,
@@ -281,6 +281,16 @@ fn title(scenes: &[String]) -> String {
     scenes.iter().map(name).collect::<Vec<_>>().join(", ")
 }
 
+/// Whether each organ is of a plant: some of it is leaf or stem.
+fn plants(results: &Results) -> Vec<bool> {
+    let mut plants = vec![false; results.organs.len()];
+    let of_triangles = results.triangles.organ.iter().zip(&results.triangles.plant);
+    for (&organ, &plant) in of_triangles {
+        plants[organ as usize] |= plant;
+    }
+    plants
+}
+
 /// The scale of what organs absorb per area of their own.
 fn organ_scale(organs: &[Organ], plants: &[bool], band: usize) -> Scale {
     let shown = organs.iter().zip(plants);
@@ -291,12 +301,12 @@ fn organ_scale(organs: &[Organ], plants: &[bool], band: usize) -> Scale {
     }))
 }
 
-/// All triangles that are not soil.
+/// All triangles of plants.
 fn patches(canopy: &Canopy, results: &Results) -> Vec<Patch> {
     let bands = results.bands.len();
     let numbered = canopy.triangles().enumerate();
     numbered
-        .filter(|(_, triangle)| *canopy.material_of(triangle) != Material::Soil)
+        .filter(|&(t, _)| results.triangles.plant[t])
         .map(|(t, triangle)| Patch {
             z_m: triangle.corners_m.iter().map(|v| v.z).sum::<f64>() / 3.0 + canopy.origin_m.z,
             area_m2: results.triangles.area_m2[t],

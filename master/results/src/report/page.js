@@ -47,9 +47,11 @@ function pick(organ) {
   showPicked();
 }
 
-// Tables of some versions have species.
+const manySpecies = new Set(report.organs.map((organ) => organ.species)).size > 1;
+
+// Species are named where there are several.
 function organName(organ) {
-  return `${organ.species === undefined ? '' : `species ${html(organ.species)}, `}plant ${html(organ.plant)}, organ ${html(organ.organ)}`;
+  return `${manySpecies ? `species ${organ.species}, ` : ''}plant ${organ.plant}, organ ${organ.organ}`;
 }
 
 function showPicked() {
@@ -57,7 +59,7 @@ function showPicked() {
   const organ = report.organs[state.picked];
   if (!organ) {
     const options = report.organs.length > 5000 ? '' : report.organs
-      .map((o, k) => `<option value="${k}">${organName(o)}</option>`).join('');
+      .map((o, k) => `<option value="${k}">${html(organName(o))}</option>`).join('');
     panel.innerHTML = '<h3>An organ’s numbers</h3><p class="hint">Click a leaf in the drawing' +
       (options ? `, or choose one:</p><select id="choose"><option value="-1">—</option>${options}</select>` : '.</p>');
     if (options) element('choose').addEventListener('change', (event) => pick(Number(event.target.value)));
@@ -72,8 +74,8 @@ function showPicked() {
     line('on the upper face', figure(light.upper_W_m2), 'W m⁻²') +
     line('on the lower face', figure(light.lower_W_m2), 'W m⁻²')).join('');
   const name = organName(organ);
-  panel.innerHTML = `<h3>${name[0].toUpperCase()}${name.slice(1)}</h3>` +
-    `<p class="hint">${figure(organ.area_m2 * 1e4)} cm², one-sided</p>` +
+  panel.innerHTML = `<h3>${html(name[0].toUpperCase() + name.slice(1))}</h3>` +
+    `<p class="hint">${html(organ.kind)}, ${figure(organ.area_m2 * 1e4)} cm², one-sided</p>` +
     `<p class="hint">Absorbed, W per m² of this organ, ± one standard error</p>${errorBars(rows)}` +
     `<table>${lines}</table><p><button type="button" id="unpick">Choose another</button></p>`;
   element('unpick').addEventListener('click', () => pick(-1));
@@ -114,7 +116,8 @@ function showProfiles() {
 }
 
 function showBalance() {
-  const flows = [['absorbed by plants', 'absorbed_plants_W'], ['absorbed by the soil', 'absorbed_soil_W'],
+  const flows = [['absorbed by plants', 'absorbed_plants_W'], ['… by leaves', 'absorbed_leaves_W'], ['… by stems', 'absorbed_stems_W'],
+    ['absorbed by structures', 'absorbed_structures_W'], ['absorbed by the soil', 'absorbed_soil_W'],
     ['escaped upwards', 'escaped_up_W'], ['escaped downwards', 'escaped_down_W'], ['closure', 'closure_W']];
   // where the canopy repeats, per ground; a scene that stands alone, as a whole
   const divisor = report.periodic ? ground : 1;
@@ -126,7 +129,18 @@ function showBalance() {
     rows.push([title, ...report.balance.map((b) => withError(b[key].value / divisor, b[key].se / divisor) + part(b[key].value, b.incoming_W))]);
   }
   element('balance').innerHTML = table([report.periodic ? 'W per m² of ground' : 'W, whole scene', ...report.balance.map((b) => html(b.band))], rows) +
+    ofMaterials(divisor, part) +
     '<p class="hint">± one standard error. Closure is what is left of incoming light; nothing is scaled to make it close, so it should be within a few of its own standard errors.</p>';
+}
+
+// What each material absorbs, where there are several.
+function ofMaterials(divisor, part) {
+  const { materials } = report.balance[0];
+  if (materials.length < 2) return '';
+  const order = ['leaf', 'stem', 'structure', 'soil'];
+  const numbers = materials.map((_, m) => m).sort((a, b) => order.indexOf(materials[a].kind) - order.indexOf(materials[b].kind) || a - b);
+  return table(['absorbed by', 'kind', ...report.balance.map((b) => html(b.band))], numbers.map((m) => [html(materials[m].name), materials[m].kind,
+    ...report.balance.map((b) => { const { value, se } = b.materials[m].absorbed_W; return withError(value / divisor, se / divisor) + part(value, b.incoming_W); })]));
 }
 
 function showErrors() {
@@ -150,7 +164,7 @@ function errorParts() {
 
 function showFacts() {
   const { plants, organs, triangles, sources, version, resources, seed } = report;
-  const index = report.area_index === null ? '' : ` · area index ${figure(report.area_index, 3)} (one-sided area, without soil, per area of ${groundName}, ${groundSize})`;
+  const index = report.area_index === null ? '' : ` · area index ${figure(report.area_index, 3)} (one-sided area of leaves and stems, per area of ${groundName}, ${groundSize})`;
   element('facts').textContent = `${plants} plants, ${organs.length} organs, ${triangles.toLocaleString('en')} triangles${index} · ${report.light} (${sources} sources)`;
   element('reasons').innerHTML = report.reasons.map((reason) => `<li>${html(reason)}</li>`).join('');
   element('cost').textContent = `nestrad ${version}, seed ${seed}; ${figure(resources.wall_s, 3)} s, ${figure(resources.cpu_s, 3)} s of processor time.`;

@@ -105,10 +105,6 @@ impl Table {
         })
     }
 
-    pub(crate) fn has(&self, column: &str) -> bool {
-        self.columns.iter().any(|own| own == column)
-    }
-
     /// Calls `each` for all rows, with the cells of these columns.
     pub(crate) fn rows(
         &self,

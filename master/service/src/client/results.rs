@@ -2,10 +2,11 @@
 //! scene is an error.
 
 use glam::DVec2;
+use nestrad_common::canopy::Canopy;
 use nestrad_common::scene::Scene;
 use nestrad_engine::exchange::JobCounts;
 use nestrad_engine::rounds::Accuracy;
-use nestrad_engine::solution::{Balance, Estimate, ItemLight, SoilMap, Solution};
+use nestrad_engine::solution::{Balance, Estimate, ItemLight, MaterialLight, SoilMap, Solution};
 use nestrad_engine::stopwatch::{Stage, Usage};
 use nestrad_engine::traced::WorkDone;
 use nestrad_kernel::rows::Counts;
@@ -66,7 +67,9 @@ impl<'a> Arriving<'a> {
             }
             Some(Part::Soil(slice)) => self.soil(slice),
             Some(Part::Summary(summary)) => {
-                self.solution.balance = summary.bands.iter().map(balance).collect();
+                let canopy = &self.scene.canopy;
+                let bands = summary.bands.iter().map(|band| balance(band, canopy));
+                self.solution.balance = bands.collect::<Result<_, _>>()?;
                 self.summary = Some(summary);
                 Ok(())
             }
@@ -202,18 +205,32 @@ fn append(
     Ok(())
 }
 
-fn balance(band: &v1::BandSummary) -> Balance {
+fn balance(band: &v1::BandSummary, canopy: &Canopy) -> Result<Balance, RemoteError> {
     let estimate = |quantity: Option<v1::Quantity>| {
         let v1::Quantity { value, se } = quantity.unwrap_or_default();
         Estimate { value, se }
     };
-    Balance {
+    if band.materials.len() != canopy.materials.len() {
+        return Err(RemoteError::Answer("materials that do not fit the scene"));
+    }
+    let materials = canopy.materials.iter().zip(canopy.kinds());
+    let materials = materials.zip(&band.materials);
+    let materials = materials.map(|((material, kind), of)| MaterialLight {
+        name: material.to_string(),
+        kind,
+        absorbed_W: estimate(of.absorbed_w),
+    });
+    Ok(Balance {
         band: band.band.clone(),
         incoming_W: band.incoming_w,
         absorbed_plants_W: estimate(band.absorbed_plants_w),
+        absorbed_leaves_W: estimate(band.absorbed_leaves_w),
+        absorbed_stems_W: estimate(band.absorbed_stems_w),
+        absorbed_structures_W: estimate(band.absorbed_structures_w),
         absorbed_soil_W: estimate(band.absorbed_soil_w),
         escaped_up_W: estimate(band.escaped_up_w),
         escaped_down_W: estimate(band.escaped_down_w),
         closure_W: estimate(band.closure_w),
-    }
+        materials: materials.collect(),
+    })
 }

@@ -1,12 +1,12 @@
 //! A scene as the slices that a master takes.
 
-use nestrad_common::canopy::{Canopy, Material};
+use nestrad_common::canopy::{Canopy, Kind};
 use nestrad_common::light::SkyLight;
 use nestrad_common::light::sky::Radiance;
 use nestrad_common::scene::Scene;
 use nestrad_proto::{SLICE_BYTES, v1};
 use v1::scene_header::Geometry;
-use v1::scene_material::Kind;
+use v1::scene_material::Kind as Sent;
 use v1::scene_slice::Part;
 
 /// Bytes of a triangle, as it travels.
@@ -89,16 +89,19 @@ fn sky(light: &SkyLight) -> v1::SkyLight {
 
 /// The canopy stands at its local origin already: the master leaves it there, bit for bit.
 fn geometry(canopy: &Canopy) -> v1::GeometryHeader {
-    let materials = canopy.materials.iter().enumerate();
-    let materials = materials.map(|(number, material)| v1::SceneMaterial {
+    let kinds = canopy.kinds().into_iter().zip(canopy.solid());
+    let materials = canopy.materials.iter().zip(kinds).enumerate();
+    let materials = materials.map(|(number, (material, (kind, solid)))| v1::SceneMaterial {
         // numbered, so that no two are the same
         name: format!("{number}: {material}"),
-        kind: match material {
-            Material::Stem { .. } => Kind::Stem,
-            Material::Soil => Kind::Soil,
-            Material::Leaf { .. } | Material::Named(_) => Kind::Leaf,
+        kind: match kind {
+            Kind::Leaf => Sent::Leaf,
+            Kind::Stem => Sent::Stem,
+            Kind::Structure => Sent::Structure,
+            Kind::Soil => Sent::Soil,
         }
         .into(),
+        solid: Some(solid),
     });
     v1::GeometryHeader {
         triangles: canopy.len() as u64,
@@ -124,12 +127,13 @@ fn organs(canopy: &Canopy, from: usize) -> v1::OrganSlice {
     };
     let mut bytes = 0;
     for organ in &canopy.organs[from..] {
-        bytes += organ.id.len() + organ.plant.len() + 8;
+        bytes += organ.id.len() + organ.plant.len() + organ.species.len() + 12;
         if bytes > SLICE_BYTES && !slice.id.is_empty() {
             break;
         }
         slice.id.push(organ.id.clone());
         slice.plant.push(organ.plant.clone());
+        slice.species.push(organ.species.clone());
     }
     slice
 }

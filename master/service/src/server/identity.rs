@@ -55,11 +55,12 @@ pub(super) struct GeometryHasher {
 
 impl GeometryHasher {
     pub(super) fn new(header: &v1::GeometryHeader) -> Self {
-        let mut triangles = Words::new("nestrad geometry 1");
+        let mut triangles = Words::new("nestrad geometry 2");
         triangles.count(header.materials.len());
         for material in &header.materials {
             triangles.text(&material.name);
             triangles.count(material.kind as usize);
+            triangles.count(material.solid.map_or(0, |solid| 1 + usize::from(solid)));
         }
         let pattern = header.pattern.as_ref();
         let pattern = pattern.map(|p| [p.min_x_m, p.min_y_m, p.max_x_m, p.max_y_m]);
@@ -68,7 +69,7 @@ impl GeometryHasher {
         triangles.count(usize::from(header.soil_z_m.is_some()));
         triangles.numbers(&[header.soil_z_m.unwrap_or_default()]);
         Self {
-            organs: Words::new("nestrad organs 1"),
+            organs: Words::new("nestrad organs 2"),
             triangles,
         }
     }
@@ -76,6 +77,7 @@ impl GeometryHasher {
     pub(super) fn organ(&mut self, organ: &Organ) {
         self.organs.text(&organ.id);
         self.organs.text(&organ.plant);
+        self.organs.text(&organ.species);
     }
 
     pub(super) fn triangle(&mut self, vertices: &[DVec3; 3], organ: u32, material: u32) {

@@ -73,7 +73,7 @@ impl SolveService for Rpc {
             Some(Geometry::NewGeometry(new)) => {
                 let upload = Upload::begin(new)?;
                 // what is wrong with the light should not wait for a canopy to arrive
-                let lighting = lighting(&header, upload.materials())?;
+                let lighting = lighting(&header, upload.surfaces())?;
                 (self.receive(upload, &mut slices).await?, lighting)
             }
             Some(Geometry::GeometryId(id)) => {
@@ -82,8 +82,8 @@ impl SolveService for Rpc {
                     return Err(ServiceError::new(ErrorCode::Invalid, message).into());
                 }
                 let id = parse(id, "geometry_id")?;
-                let materials = self.scenes.materials(id)?;
-                (id, lighting(&header, &materials)?)
+                let surfaces = self.scenes.surfaces(id)?;
+                (id, lighting(&header, &surfaces)?)
             }
             None => {
                 let message = "header: expected new_geometry or geometry_id, found neither";

@@ -4,13 +4,13 @@
 use std::collections::HashMap;
 use std::sync::{Arc, Mutex, PoisonError};
 
-use nestrad_common::canopy::Material;
 use nestrad_common::scene::Scene;
 
 use super::budget::{Budget, Reservation};
 use super::error::{ErrorCode, ServiceError};
 use super::held::{HeldCanopy, Lighting};
 use super::identity::{Id, scene_id};
+use super::intake::Surface;
 
 /// Scenes that are held at a time, however small.
 const MAX_SCENES: usize = 1024;
@@ -117,9 +117,9 @@ impl Scenes {
     }
 
     /// What a geometry that is held is made of.
-    pub(super) fn materials(&self, id: Id) -> Result<Vec<Material>, ServiceError> {
+    pub(super) fn surfaces(&self, id: Id) -> Result<Vec<Surface>, ServiceError> {
         let geometry = self.lock().geometry(id)?;
-        Ok(geometry.item.canopy.materials.clone())
+        Ok(Surface::of(&geometry.item.canopy))
     }
 
     /// Keeps a scene of a geometry that is held.

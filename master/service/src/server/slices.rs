@@ -63,7 +63,8 @@ fn parts(items: usize, item_bytes: usize) -> impl Iterator<Item = (usize, usize)
 fn end_of_organs(outcome: &HeldSolution, from: usize) -> usize {
     let mut bytes = 0;
     let fits = |organ: &&nestrad_common::canopy::Organ| {
-        bytes += (LIGHT_BYTES + 8) * outcome.bands.len() + 16 + organ.id.len() + organ.plant.len();
+        bytes += (LIGHT_BYTES + 8) * outcome.bands.len() + 16 + 4;
+        bytes += organ.id.len() + organ.plant.len() + organ.species.len();
         bytes <= SLICE_BYTES
     };
     let rest = &outcome.organs[from..];
@@ -78,6 +79,7 @@ fn organs(outcome: &HeldSolution, from: usize, to: usize) -> v1::OrganLight {
         bands: outcome.bands.clone(),
         id: organs.iter().map(|organ| organ.id.clone()).collect(),
         plant: organs.iter().map(|organ| organ.plant.clone()).collect(),
+        species: organs.iter().map(|organ| organ.species.clone()).collect(),
         area_m2: outcome.solution.organ_area_m2[from..to].to_vec(),
         light: light(&outcome.solution.organs[from * bands..to * bands]),
         absorbed_bias_w: outcome.solution.organ_bias_W[from * bands..to * bands].to_vec(),

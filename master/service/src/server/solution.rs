@@ -3,10 +3,11 @@
 use nestrad_common::canopy::Organ;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::rounds::Solved;
-use nestrad_engine::solution::{Estimate, ItemLight, Solution};
+use nestrad_engine::solution::{Estimate, ItemLight, MaterialLight, Solution};
 use nestrad_engine::stopwatch::{Stage, Usage};
 use nestrad_proto::v1;
 
+use super::intake::sent;
 use super::scenes::HeldScene;
 
 /// Results, and all that is needed to give them out without the scene.
@@ -38,11 +39,15 @@ impl HeldSolution {
             band: balance.band.clone(),
             incoming_w: balance.incoming_W,
             absorbed_plants_w: quantity(balance.absorbed_plants_W),
+            absorbed_leaves_w: quantity(balance.absorbed_leaves_W),
+            absorbed_stems_w: quantity(balance.absorbed_stems_W),
+            absorbed_structures_w: quantity(balance.absorbed_structures_W),
             absorbed_soil_w: quantity(balance.absorbed_soil_W),
             escaped_up_w: quantity(balance.escaped_up_W),
             escaped_down_w: quantity(balance.escaped_down_W),
             closure_w: quantity(balance.closure_W),
             organ_error_percent: error.rms_percent,
+            materials: balance.materials.iter().map(material).collect(),
         });
         let summary = v1::SolveSummary {
             version: env!("CARGO_PKG_VERSION").to_owned(),
@@ -105,7 +110,7 @@ fn bytes(triangles: usize, organs: usize, cells: usize, bands: usize) -> u64 {
 }
 
 fn name_bytes(organ: &Organ) -> usize {
-    organ.id.len() + organ.plant.len()
+    organ.id.len() + organ.plant.len() + organ.species.len()
 }
 
 fn quantity(estimate: Estimate) -> Option<v1::Quantity> {
@@ -113,6 +118,14 @@ fn quantity(estimate: Estimate) -> Option<v1::Quantity> {
         value: estimate.value,
         se: estimate.se,
     })
+}
+
+fn material(of: &MaterialLight) -> v1::MaterialLight {
+    v1::MaterialLight {
+        name: of.name.clone(),
+        kind: sent(of.kind).into(),
+        absorbed_w: quantity(of.absorbed_W),
+    }
 }
 
 fn cost(stage: &Stage) -> v1::StageCost {

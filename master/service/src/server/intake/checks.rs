@@ -5,16 +5,16 @@ use std::fmt::Display;
 use std::sync::Arc;
 
 use glam::DVec3;
-use nestrad_common::canopy::Material;
+use nestrad_common::canopy::Kind;
 use nestrad_common::formats::light::MIN_DESCENT;
 use nestrad_common::formats::pattern::{MIN_SIDE, Rectangle};
 use nestrad_common::light::sky::Radiance;
 use nestrad_common::light::{Light, SkyLight, Source};
 use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
 use nestrad_proto::v1;
-use nestrad_proto::v1::scene_material::Kind;
+use nestrad_proto::v1::scene_material::Kind as Sent;
 
-use super::{MAX_NAME_BYTES, ServiceError, material_of};
+use super::{MAX_NAME_BYTES, ServiceError, Surface};
 use crate::server::held::Lighting;
 
 const MAX_BANDS: usize = 256;
@@ -24,7 +24,7 @@ const MAX_SOURCES: usize = 65_536;
 /// Optics and light for a canopy of these materials.
 pub(in crate::server) fn lighting(
     header: &v1::SceneHeader,
-    materials: &[Material],
+    surfaces: &[Surface],
 ) -> Result<Lighting, ServiceError> {
     let v1::SceneHeader {
         bands,
@@ -49,7 +49,7 @@ pub(in crate::server) fn lighting(
             let found = format_args!("'{}' again", band.name);
             return Err(ServiceError::invalid(place, "a name of its own", found));
         }
-        checked.push(self::band(b, band, materials)?);
+        checked.push(self::band(b, band, surfaces)?);
     }
     let sources = sources.iter().enumerate();
     let sources = sources.map(|(s, given)| source(s, given, bands.len()));
@@ -66,19 +66,19 @@ pub(in crate::server) fn lighting(
     })
 }
 
-fn band(b: usize, given: &v1::BandOptics, materials: &[Material]) -> Result<Band, ServiceError> {
+fn band(b: usize, given: &v1::BandOptics, surfaces: &[Surface]) -> Result<Band, ServiceError> {
     let soil_albedo = given.soil_albedo;
     if !(0.0..=1.0).contains(&soil_albedo) {
         let place = format_args!("bands[{b}].soil_albedo");
         return Err(ServiceError::invalid(place, "0 to 1", soil_albedo));
     }
-    if given.materials.len() != materials.len() {
+    if given.materials.len() != surfaces.len() {
         let place = format_args!("bands[{b}].materials");
-        let wanted = format_args!("{}, one per material", materials.len());
+        let wanted = format_args!("{}, one per material", surfaces.len());
         return Err(ServiceError::invalid(place, wanted, given.materials.len()));
     }
-    let materials = given.materials.iter().zip(materials).enumerate();
-    let materials = materials.map(|(m, (given, material))| {
+    let materials = given.materials.iter().zip(surfaces).enumerate();
+    let materials = materials.map(|(m, (given, surface))| {
         let face = |rho, tau| FaceOptics { rho, tau };
         let optics = LeafOptics {
             upper: face(given.rho_upper, given.tau_upper),
@@ -89,12 +89,11 @@ fn band(b: usize, given: &v1::BandOptics, materials: &[Material]) -> Result<Band
             let wanted = "finite numbers of at least 0 with rho + tau <= 1";
             return Err(ServiceError::invalid(place, wanted, fault.values()));
         }
-        let opaque = matches!(material, Material::Stem { .. } | Material::Soil);
-        if opaque && (given.tau_upper > 0.0 || given.tau_lower > 0.0) {
+        if surface.is_opaque() && (given.tau_upper > 0.0 || given.tau_lower > 0.0) {
             let tau = given.tau_upper.max(given.tau_lower);
             return Err(ServiceError::invalid(
                 place,
-                "tau = 0 of stem and soil",
+                "tau = 0 of soil and of what is solid",
                 tau,
             ));
         }
@@ -188,13 +187,13 @@ fn unit(given: DVec3) -> DVec3 {
 }
 
 /// The materials of a geometry.
-pub(super) fn materials(given: &[v1::SceneMaterial]) -> Result<Vec<Material>, ServiceError> {
+pub(super) fn surfaces(given: &[v1::SceneMaterial]) -> Result<Vec<Surface>, ServiceError> {
     if !(1..=MAX_MATERIALS).contains(&given.len()) {
         let wanted = format_args!("1 to {MAX_MATERIALS}");
         return Err(ServiceError::invalid("materials", wanted, given.len()));
     }
     let mut names = HashSet::new();
-    let mut materials: Vec<Material> = Vec::with_capacity(given.len());
+    let mut surfaces = Vec::with_capacity(given.len());
     for (m, material) in given.iter().enumerate() {
         name(format_args!("materials[{m}].name"), &material.name)?;
         if !names.insert(&material.name) {
@@ -202,18 +201,24 @@ pub(super) fn materials(given: &[v1::SceneMaterial]) -> Result<Vec<Material>, Se
             let found = format_args!("'{}' again", material.name);
             return Err(ServiceError::invalid(place, "a name of its own", found));
         }
-        let kind = Kind::try_from(material.kind).map_err(|_| {
+        let kind = Sent::try_from(material.kind).map_err(|_| {
             let place = format_args!("materials[{m}].kind");
-            ServiceError::invalid(place, "leaf, stem or soil", material.kind)
+            ServiceError::invalid(place, "leaf, stem, soil or structure", material.kind)
         })?;
-        let checked = material_of(m, kind, &material.name);
-        if checked == Material::Soil && materials.contains(&checked) {
-            let place = format_args!("materials[{m}].kind");
-            return Err(ServiceError::invalid(place, "one soil", "another"));
+        let kind = match kind {
+            Sent::Leaf => Kind::Leaf,
+            Sent::Stem => Kind::Stem,
+            Sent::Soil => Kind::Soil,
+            Sent::Structure => Kind::Structure,
+        };
+        let is_solid = material.solid.unwrap_or(kind == Kind::Stem);
+        if is_solid && kind == Kind::Structure {
+            let place = format_args!("materials[{m}].solid");
+            return Err(ServiceError::invalid(place, "false of a structure", "true"));
         }
-        materials.push(checked);
+        surfaces.push(Surface::new(m, &material.name, kind, is_solid));
     }
-    Ok(materials)
+    Ok(surfaces)
 }
 
 /// The pattern of a geometry.

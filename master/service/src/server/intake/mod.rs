@@ -3,6 +3,7 @@
 
 mod checks;
 mod options;
+mod surface;
 #[cfg(test)]
 mod tests;
 
@@ -10,7 +11,7 @@ use std::collections::HashSet;
 
 use glam::DVec3;
 use nestrad_common::assemble::{Geometry, build_canopy};
-use nestrad_common::canopy::{Material, Organ, Triangle};
+use nestrad_common::canopy::{Organ, Triangle};
 use nestrad_common::formats::pattern::Rectangle;
 use nestrad_common::formats::{GeometryFile, MAX_COORDINATE, MAX_TRIANGLES, Origins};
 use nestrad_common::inspection::inspect;
@@ -22,10 +23,11 @@ use super::held::HeldCanopy;
 use super::identity::GeometryHasher;
 pub(super) use checks::lighting;
 pub(super) use options::settings;
+pub(super) use surface::{Surface, sent};
 
 /// Bytes that a triangle takes while it is held, and an organ without its text.
 const TRIANGLE_BYTES: u64 = 88;
-const ORGAN_BYTES: u64 = 128;
+const ORGAN_BYTES: u64 = 176;
 
 /// Longest name of an organ, plant, material or band, bytes.
 const MAX_NAME_BYTES: usize = 4096;
@@ -35,7 +37,7 @@ const MAX_NAME_BYTES: usize = 4096;
 pub(super) struct Upload {
     triangles: usize,
     organs: usize,
-    materials: usize,
+    surfaces: Vec<Surface>,
     arrived: GeometryFile,
     known: HashSet<Organ>,
     pattern: Option<Rectangle>,
@@ -55,14 +57,14 @@ impl Upload {
             )),
         };
         let pattern = header.pattern.as_ref().map(checks::pattern).transpose()?;
-        let materials = checks::materials(&header.materials)?;
-        let materials_len = materials.len();
+        let surfaces = checks::surfaces(&header.materials)?;
         let mut arrived = GeometryFile::new("");
-        arrived.materials = materials;
+        let materials = surfaces.iter().map(|surface| surface.material.clone());
+        arrived.materials = materials.collect();
         Ok(Self {
             triangles: count("triangles", header.triangles)?,
             organs: count("organs", header.organs)?,
-            materials: materials_len,
+            surfaces,
             arrived,
             known: HashSet::new(),
             pattern,
@@ -72,8 +74,8 @@ impl Upload {
     }
 
     /// What triangles will be made of.
-    pub(super) fn materials(&self) -> &[Material] {
-        &self.arrived.materials
+    pub(super) fn surfaces(&self) -> &[Surface] {
+        &self.surfaces
     }
 
     /// Bytes that the whole will take, but for the names of organs.
@@ -90,14 +92,22 @@ impl Upload {
             got,
             announced: self.organs,
         };
-        expected.check(slice.id.len(), &[("plant", slice.plant.len())])?;
+        let (count, mut species) = (slice.id.len(), slice.species);
+        if species.is_empty() {
+            species.resize(count, String::new());
+        }
+        let columns = [("plant", slice.plant.len()), ("species", species.len())];
+        expected.check(count, &columns)?;
         let mut bytes = 0;
-        for (index, (id, plant)) in (got..).zip(slice.id.into_iter().zip(slice.plant)) {
-            for (name, text) in [("id", &id), ("plant", &plant)] {
-                checks::name(format_args!("organs[{index}].{name}"), text)?;
+        let names = slice.id.into_iter().zip(slice.plant).zip(species);
+        for (index, ((id, plant), species)) in (got..).zip(names) {
+            for (name, text) in [("id", &id), ("plant", &plant), ("species", &species)] {
+                if name != "species" || !text.is_empty() {
+                    checks::name(format_args!("organs[{index}].{name}"), text)?;
+                }
             }
-            bytes += (id.len() + plant.len()) as u64;
-            let organ = Organ { id, plant };
+            bytes += (id.len() + plant.len() + species.len()) as u64;
+            let organ = Organ { species, plant, id };
             self.hasher.organ(&organ);
             if !self.known.insert(organ.clone()) {
                 let found = format!("'{}' of plant '{}' again", organ.id, organ.plant);
@@ -134,7 +144,7 @@ impl Upload {
             let vertices = triangle(index, vertices)?;
             for (name, number, of) in [
                 ("organ", organ, self.organs),
-                ("material", material, self.materials),
+                ("material", material, self.surfaces.len()),
             ] {
                 if number as usize >= of {
                     let place = format_args!("triangles[{index}].{name}");
@@ -174,8 +184,10 @@ impl Upload {
             soil: self.soil_z_m,
             unit: Unit::Metre,
         };
-        let (canopy, _) =
+        let (mut canopy, _) =
             build_canopy(geometry).map_err(|e| ServiceError::new(ErrorCode::Invalid, e))?;
+        let kinds = self.surfaces.into_iter();
+        canopy.declared = kinds.map(|of| (of.material, of.kind)).collect();
         let inspection = inspect(&canopy, &Origins::default());
         Ok(HeldCanopy {
             id: self.hasher.id(),
@@ -232,17 +244,4 @@ fn triangle(index: usize, flat: &[f64]) -> Result<[DVec3; 3], ServiceError> {
         }
     }
     Ok([0, 3, 6].map(|k| DVec3::from_slice(&flat[k..k + 3])))
-}
-
-/// What a material of a scene is to the solve.
-fn material_of(index: usize, kind: v1::scene_material::Kind, name: &str) -> Material {
-    use v1::scene_material::Kind;
-    match kind {
-        Kind::Leaf => Material::Named(name.to_owned()),
-        // a stem's number only tells it from other stems
-        Kind::Stem => Material::Stem {
-            species: index as u32 + 1,
-        },
-        Kind::Soil => Material::Soil,
-    }
 }

@@ -1,5 +1,6 @@
 //! Bands, sources and skies.
 
+use nestrad_common::canopy::Kind;
 use nestrad_common::light::Light;
 
 use super::*;
@@ -27,8 +28,10 @@ pub(super) fn sun() -> v1::ParallelSource {
     }
 }
 
-pub(super) const MATERIALS: [Material; 2] =
-    [Material::Leaf { species: 1 }, Material::Stem { species: 2 }];
+pub(super) fn surfaces() -> [Surface; 2] {
+    let leaf = Surface::new(0, "leaf", Kind::Leaf, false);
+    [leaf, Surface::new(1, "stem", Kind::Stem, true)]
+}
 
 fn light_of(source: v1::ParallelSource) -> Result<Light, ServiceError> {
     let header = v1::SceneHeader {
@@ -36,7 +39,7 @@ fn light_of(source: v1::ParallelSource) -> Result<Light, ServiceError> {
         sources: vec![source],
         ..v1::SceneHeader::default()
     };
-    lighting(&header, &MATERIALS).map(|lighting| Light::clone(&lighting.light))
+    lighting(&header, &surfaces()).map(|lighting| Light::clone(&lighting.light))
 }
 
 #[test]
@@ -65,7 +68,7 @@ fn light_that_cannot_be_is_refused() {
             sources: vec![source],
             ..v1::SceneHeader::default()
         };
-        refusal(lighting(&header, &MATERIALS))
+        refusal(lighting(&header, &surfaces()))
     };
     for (message, said) in [
         (with(|b, _| b.clear()), "bands: expected 1 to 256, found 0"),
@@ -94,7 +97,7 @@ fn light_that_cannot_be_is_refused() {
         ),
         (
             with(|b, _| b[0].materials[1].tau_lower = 0.1),
-            "tau = 0 of stem and soil",
+            "tau = 0 of soil and of what is solid",
         ),
         (
             with(|_, s| s.irradiance_w_m2.clear()),
@@ -145,7 +148,7 @@ fn skies_that_cannot_be_are_refused() {
             sky: Some(sky),
             ..v1::SceneHeader::default()
         };
-        lighting(&header, &MATERIALS)
+        lighting(&header, &surfaces())
     };
     let taken = with(|_| {}).unwrap().light;
     let towards_sun = DVec3::new(0.6, 0.0, 0.8);

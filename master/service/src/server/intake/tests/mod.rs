@@ -3,7 +3,7 @@
 mod light;
 mod random;
 
-use nestrad_common::canopy::Canopy;
+use nestrad_common::canopy::{Canopy, Material};
 use nestrad_common::options::Diameter;
 use nestrad_proto::v1;
 use nestrad_proto::v1::scene_material::Kind;
@@ -15,6 +15,7 @@ fn header() -> v1::GeometryHeader {
     let material = |name: &str, kind: Kind| v1::SceneMaterial {
         name: name.to_owned(),
         kind: kind.into(),
+        solid: None,
     };
     v1::GeometryHeader {
         triangles: 2,
@@ -35,6 +36,7 @@ fn organs() -> v1::OrganSlice {
         first: 0,
         id: vec!["a".into(), "b".into()],
         plant: vec!["1".into(), "1".into()],
+        species: Vec::new(),
     }
 }
 
@@ -135,6 +137,53 @@ fn the_same_content_has_the_same_name_however_it_is_cut() {
 }
 
 #[test]
+fn kinds_and_species_arrive() {
+    let mut header = header();
+    for (name, kind, solid) in [
+        ("bark", Kind::Stem, Some(false)),
+        ("earth", Kind::Soil, None),
+        ("clay", Kind::Soil, None),
+        ("panel", Kind::Structure, None),
+        ("fruit", Kind::Leaf, Some(true)),
+    ] {
+        header.materials.push(v1::SceneMaterial {
+            name: name.to_owned(),
+            kind: kind.into(),
+            solid,
+        });
+    }
+    let mut organs = organs();
+    organs.id[1] = "a".into();
+    let message = refusal(received(&header, organs.clone(), &triangles()));
+    assert!(message.contains("an organ of its own"), "{message}");
+    organs.species = vec!["oak".into()];
+    let message = refusal(received(&header, organs.clone(), &triangles()));
+    assert!(message.contains("species: expected 2"), "{message}");
+    organs.species.push(String::new());
+    let held = received(&header, organs, &triangles()).unwrap();
+    let canopy = &held.canopy;
+    assert_eq!(canopy.organs[0].species, "oak");
+    use nestrad_common::canopy::Kind as Own;
+    let kinds = [
+        Own::Leaf,
+        Own::Stem,
+        Own::Stem,
+        Own::Soil,
+        Own::Soil,
+        Own::Structure,
+        Own::Leaf,
+    ];
+    assert_eq!(canopy.kinds(), kinds);
+    let solid = [false, true, false, false, false, false, true];
+    assert_eq!(canopy.solid(), solid);
+    let opaque = Surface::of(canopy)
+        .iter()
+        .map(Surface::is_opaque)
+        .collect::<Vec<_>>();
+    assert_eq!(opaque, [false, true, false, true, true, false, true]);
+}
+
+#[test]
 fn headers_that_cannot_be_are_refused() {
     let with = |change: fn(&mut v1::GeometryHeader)| {
         let mut header = header();
@@ -166,11 +215,11 @@ fn headers_that_cannot_be_are_refused() {
         ),
         (
             with(|h| h.materials[0].kind = 9),
-            "materials[0].kind: expected leaf, stem or soil",
+            "materials[0].kind: expected leaf, stem, soil or structure",
         ),
         (
-            with(|h| h.materials.iter_mut().for_each(|m| m.kind = 2)),
-            "expected one soil",
+            with(|h| (h.materials[1].kind, h.materials[1].solid) = (3, Some(true))),
+            "materials[1].solid: expected false of a structure, found true",
         ),
         (with(|h| h.soil_z_m = Some(f64::NAN)), "soil height"),
         (

@@ -4,7 +4,7 @@ use nestrad_proto::v1;
 use proptest::prelude::*;
 use prost::Message;
 
-use super::light::{MATERIALS, band, sky, sun};
+use super::light::{band, sky, sun, surfaces};
 use super::*;
 
 /// Whatever comes is taken in or refused.
@@ -15,7 +15,7 @@ fn take_in(slices: Vec<v1::SceneSlice>) {
     for part in slices.into_iter().filter_map(|slice| slice.part) {
         let fits = match (part, &mut upload) {
             (Part::Header(header), _) => {
-                let _ = lighting(&header, &MATERIALS);
+                let _ = lighting(&header, &surfaces());
                 if let Some(Geometry::NewGeometry(new)) = &header.geometry {
                     upload = Upload::begin(new).ok();
                 }
