@@ -10,6 +10,7 @@
 
 pub mod assemble;
 pub mod canopy;
+pub mod figures;
 pub mod formats;
 pub mod generate;
 pub mod geometry;

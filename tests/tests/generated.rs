@@ -5,11 +5,13 @@
 use std::num::NonZeroUsize;
 
 use nestrad_common::assemble::{load, load_scene_file};
-use nestrad_common::generate::{Bean, Generated, Maize, RandomCanopy};
+use nestrad_common::generate::{Bean, Generated, Maize, Overwrite, RandomCanopy};
 
 fn loads_without_a_warning(canopy: Generated) {
     let folder = tempfile::tempdir().unwrap();
-    canopy.write(folder.path(), "canopy").unwrap();
+    canopy
+        .write(folder.path(), "canopy", Overwrite::Own)
+        .unwrap();
     let inputs = load_scene_file(&folder.path().join("scene.toml")).unwrap();
     let loaded = load(&inputs).unwrap();
     assert_eq!(loaded.inspection.warnings, [""; 0]);

@@ -145,10 +145,89 @@ fn what_cannot_be_reported_is_said() {
 }
 
 #[test]
-fn parquet_is_refused() {
-    let folder = solved("parquet");
+fn parquet_was_refused() {
+    let folders = ["csv", "parquet"].map(|format| {
+        let folder = solved(format);
+        let (said, good) = report(folder.path(), &["-q"]);
+        assert!(good && said.is_empty(), "{said}");
+        folder
+    });
+    let [of_csv, of_parquet] = folders.map(|folder| {
+        let page = page(folder.path());
+        let mut facts = facts(&page);
+        // seconds differ from run to run
+        facts["resources"] = Value::Null;
+        (facts, element(&page, "absorbed-1").to_owned())
+    });
+    assert!(of_csv.0["organs"].as_array().unwrap().len() > 2);
+    assert!(of_csv == of_parquet);
+}
+
+#[test]
+fn a_report_was_made_only_where_solve_had_run() {
+    let folder = solved("csv");
+    let elsewhere = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let report = |more: &[&str]| {
+        let args = [&["report", out.to_str().unwrap()], more].concat();
+        let output = finish(nestrad(elsewhere.path(), &args));
+        (said(&output), output.status.success())
+    };
+    let (said, good) = report(&[]);
+    assert!(good, "{said}");
+    let page = page(folder.path());
+    assert_eq!(facts(&page)["title"], "bean.can");
+
+    // moved: the message says where it was, the flag where it is, seen from here
+    fs::rename(
+        folder.path().join("bean.can"),
+        elsewhere.path().join("moved.can"),
+    )
+    .unwrap();
+    let (said, good) = report(&[]);
+    let path = folder.path().join("bean.can");
+    assert!(
+        !good && said.contains(path.to_str().unwrap()) && said.contains("--scene"),
+        "{said}"
+    );
+    let (said, good) = report(&["--scene", "moved.can"]);
+    assert!(good, "{said}");
+}
+
+/// Half a square metre of leaf over a box of 2 m by 1 m.
+#[test]
+fn the_ground_of_an_open_scene_was_not_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let put = |name: &str, text: &str| fs::write(folder.path().join(name), text).unwrap();
+    put(
+        "two.can",
+        "p 1 100001001001 4 0 0 1 0.5 0 1 0.5 0.5 1 0 0.5 1\n\
+         p 1 100002001001 4 1.5 0.5 1.2 2 0.5 1.2 2 1 1.2 1.5 1 1.2\n",
+    );
+    put("par.opt", "n 1\ns d 0.2\ne d 0.1 d 0.1 0.1 d 0.1 0.1\n");
+    put("sun.light", "100 0 0 -1\n");
+    let solve = "solve two.can --optics PAR=par.opt --light sun.light --soil 0 --out out --quiet";
+    let args: Vec<&str> = solve.split(' ').collect();
+    let output = finish(nestrad(folder.path(), &args));
+    assert!(output.status.success(), "{}", said(&output));
     let (said, good) = report(folder.path(), &[]);
-    assert!(!good && said.contains("--format csv"), "{said}");
+    assert!(good, "{said}");
+    let facts = facts(&page(folder.path()));
+    assert_eq!(facts["ground_m"], serde_json::json!([2.0, 1.0]));
+    assert_eq!(facts["area_index"], 0.25);
+    // all of it is in full light, which is that of a square metre, not of a ground of another size
+    let layers = facts["layers"].as_array().unwrap();
+    let lit = layers
+        .iter()
+        .map(|l| l["by_direct_m2"][0][39].as_f64().unwrap());
+    assert!((lit.sum::<f64>() - 0.5).abs() < 1e-9, "{layers:?}");
+
+    if let Some(chromium) = chromium() {
+        let seen = seen(&chromium, folder.path(), 0);
+        let facts = seen["facts"].as_str().unwrap();
+        let said = "per area of the box around the scene, 2.00 m x 1.00 m";
+        assert!(facts.contains(said), "{facts}");
+    }
 }
 
 fn chromium() -> Option<PathBuf> {
@@ -222,6 +301,27 @@ fn a_browser_draws_it_and_picks_an_organ() {
     let panel = seen["panel"].as_str().unwrap();
     let name = organs[organ]["organ"].as_str().unwrap();
     assert!(panel.contains(&format!("organ {name}")), "{panel}");
+    // a name is not cut, and a number has its unit
+    assert!(panel.contains("PAR") && panel.contains(" W m⁻²"), "{panel}");
+    assert_eq!(seen["order"][0], "Energy balance", "{seen}");
+    assert_eq!(seen["minus_zeros"], Value::Array(Vec::new()), "{seen}");
+    assert_eq!(seen["wide"], false, "{seen}");
+
+    // shade can be told apart: the darker half of all triangles takes more of the ramp than on a linear scale
+    let ramp = |name: &str| -> Vec<f64> {
+        let places = seen["ramps"][name]["places"].as_array().unwrap();
+        places.iter().map(|place| place.as_f64().unwrap()).collect()
+    };
+    for by in ["triangle", "organ"] {
+        let [log, linear, equal] =
+            ["log", "linear", "quantiles"].map(|how| ramp(&format!("{by} {how}")));
+        assert!(log[2] - log[0] > linear[2] - linear[0], "{by}: {seen}");
+        assert!(equal[4] - equal[0] > 0.6 && equal[2] > 0.25, "{by}: {seen}");
+    }
+    // organs have a scale of their own
+    let ticks = |name: &str| seen["ramps"][name]["ticks"].as_str().unwrap().to_owned();
+    assert!(ticks("triangle log") != ticks("organ log").replace(", mean of an organ", ""));
+
     // as many digits as the standard error leaves
     let light = &organs[organ]["light"][0];
     let (value, se) = (

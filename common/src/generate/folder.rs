@@ -1,13 +1,13 @@
 //! A generated canopy as a folder that `nestrad solve` can be pointed at.
 
-use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
 use super::canopy::Generated;
+use super::drafts::{Drafts, is_own};
 use crate::light::Sky;
 use crate::light::sky::SkyError;
 
@@ -37,25 +37,26 @@ impl Generated {
     /// Every number reads back as the very same number. All files are written beside their final
     /// names first and renamed when all are complete: a run that fails leaves no half-written file
     /// under a name that counts.
-    pub fn write(&self, folder: &Path, name: &str) -> Result<(), WriteError> {
-        let io_fault = |path: &Path| {
-            let path = path.to_owned();
-            move |source| WriteError::Io { path, source }
-        };
-        let light = clear_light()?;
-        fs::create_dir_all(folder).map_err(io_fault(folder))?;
-        let mut drafts = Drafts::default();
-        drafts.add(folder.join(format!("{name}.can")), |out| {
-            self.write_can(out)
-        })?;
-        for (file, text) in [
+    ///
+    /// A file that is in the way and is not, byte for byte, what this wrote there once is overwritten
+    /// only where `overwrite` says so; else nothing is written at all.
+    pub fn write(&self, folder: &Path, name: &str, overwrite: Overwrite) -> Result<(), WriteError> {
+        let can = format!("{name}.can");
+        let texts = [
             (format!("{name}.8"), self.pattern_text()),
             ("par.opt".to_owned(), PAR_OPT.to_owned()),
             ("nir.opt".to_owned(), NIR_OPT.to_owned()),
-            ("clear.light".to_owned(), light),
+            ("clear.light".to_owned(), clear_light()?),
             ("scene.toml".to_owned(), self.scene_text(name)),
-        ] {
-            drafts.add(folder.join(file), |out| out.write_all(text.as_bytes()))?;
+        ];
+        if overwrite == Overwrite::Own {
+            let names = texts.iter().map(|(file, _)| file).chain([&can]);
+            refuse_foreign(names.map(|file| folder.join(file)))?;
+        }
+        let mut drafts = Drafts::begin(folder)?;
+        drafts.add(&can, |out| self.write_can(out))?;
+        for (file, text) in &texts {
+            drafts.add(file, |out| out.write_all(text.as_bytes()))?;
         }
         drafts.publish()
     }
@@ -100,6 +101,26 @@ impl Generated {
     }
 }
 
+/// Which files may be overwritten.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Overwrite {
+    /// Those that were generated, and are as they were then.
+    Own,
+    /// All that have the names of new ones.
+    All,
+}
+
+fn refuse_foreign(paths: impl Iterator<Item = PathBuf>) -> Result<(), WriteError> {
+    for path in paths {
+        match is_own(&path) {
+            Ok(true) => {}
+            Ok(false) => return Err(WriteError::Foreign { path }),
+            Err(source) => return Err(WriteError::Io { path, source }),
+        }
+    }
+    Ok(())
+}
+
 /// A summer morning at 45 degrees north: 500 W m⁻², a fifth of it from the sky.
 fn clear_light() -> Result<String, SkyError> {
     let sky = Sky::Clear {
@@ -118,54 +139,6 @@ fn clear_light() -> Result<String, SkyError> {
     Ok(text)
 }
 
-/// Files under provisional names, in the order of their publication; those that are still there when
-/// this is dropped are removed.
-#[derive(Default)]
-struct Drafts(Vec<(PathBuf, PathBuf)>);
-
-impl Drafts {
-    fn add(
-        &mut self,
-        path: PathBuf,
-        fill: impl FnOnce(&mut dyn Write) -> io::Result<()>,
-    ) -> Result<(), WriteError> {
-        let mut draft = path.clone().into_os_string();
-        draft.push(".partial");
-        let draft = PathBuf::from(draft);
-        self.0.push((draft.clone(), path));
-        let write = || {
-            let mut out = BufWriter::new(File::create(&draft)?);
-            fill(&mut out)?;
-            out.into_inner()
-                .map_err(io::IntoInnerError::into_error)?
-                .sync_all()
-        };
-        write().map_err(|source| WriteError::Io {
-            path: draft.clone(),
-            source,
-        })
-    }
-
-    fn publish(self) -> Result<(), WriteError> {
-        for (draft, path) in &self.0 {
-            fs::rename(draft, path).map_err(|source| WriteError::Io {
-                path: path.clone(),
-                source,
-            })?;
-        }
-        Ok(())
-    }
-}
-
-impl Drop for Drafts {
-    fn drop(&mut self) {
-        for (draft, _) in &self.0 {
-            // nothing is lost if this fails: the error that brought us here is already on its way
-            let _ = fs::remove_file(draft);
-        }
-    }
-}
-
 /// Why a canopy could not be written.
 #[derive(Debug, Error)]
 pub enum WriteError {
@@ -177,6 +150,16 @@ pub enum WriteError {
         /// What the system said.
         source: io::Error,
     },
+    /// Something of that name is there that is not as it was generated.
+    #[error(
+        "{}: was not made by nestrad generate, or was changed since; expected --force to overwrite \
+         it, or another --out",
+        path.display()
+    )]
+    Foreign {
+        /// The first such file.
+        path: PathBuf,
+    },
     /// The light could not be made.
     #[error(transparent)]
     Light(#[from] SkyError),
@@ -185,6 +168,7 @@ pub enum WriteError {
 #[cfg(test)]
 mod tests {
     use std::collections::BTreeMap;
+    use std::fs;
 
     use super::*;
     use crate::generate::{Bean, Maize};
@@ -209,7 +193,7 @@ mod tests {
             canopy
                 .generate()
                 .unwrap()
-                .write(folder.path(), "bean")
+                .write(folder.path(), "bean", Overwrite::Own)
                 .unwrap();
             files(folder.path())
         };
@@ -234,7 +218,9 @@ mod tests {
     fn numbers_read_back_as_they_were() {
         let folder = tempfile::tempdir().unwrap();
         let canopy = Maize::default().generate().unwrap();
-        canopy.write(folder.path(), "maize").unwrap();
+        canopy
+            .write(folder.path(), "maize", Overwrite::Own)
+            .unwrap();
         let numbers = |name: &str| -> Vec<Vec<f64>> {
             let text = fs::read_to_string(folder.path().join(name)).unwrap();
             let line = |line: &str| {
@@ -270,10 +256,60 @@ mod tests {
     fn what_fails_leaves_nothing_behind() {
         let folder = tempfile::tempdir().unwrap();
         let canopy = Bean::default().generate().unwrap();
-        fs::create_dir(folder.path().join("clear.light.partial")).unwrap();
-        let error = canopy.write(folder.path(), "bean").unwrap_err().to_string();
-        assert!(error.contains("clear.light.partial"), "{error}");
-        let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
-        assert_eq!(left.len(), 1);
+        fs::create_dir(folder.path().join("clear.light")).unwrap();
+        for overwrite in [Overwrite::Own, Overwrite::All] {
+            let error = canopy.write(folder.path(), "bean", overwrite);
+            let error = error.unwrap_err().to_string();
+            assert!(error.contains("clear.light"), "{error}");
+            let left: Vec<_> = fs::read_dir(folder.path()).unwrap().collect();
+            assert_eq!(left.len(), 1);
+        }
+    }
+
+    /// Another canopy of the same names may take the place of one that nobody has touched.
+    #[test]
+    fn files_of_the_user_were_overwritten() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |seed, overwrite| {
+            let bean = Bean {
+                seed,
+                ..Bean::default()
+            };
+            let canopy = bean.generate().unwrap();
+            canopy.write(folder.path(), "bean", overwrite)
+        };
+        write(1, Overwrite::Own).unwrap();
+        let first = files(folder.path());
+        write(2, Overwrite::Own).unwrap();
+        write(1, Overwrite::Own).unwrap();
+        assert!(files(folder.path()) == first);
+
+        for name in first.keys() {
+            let path = folder.path().join(name);
+            let own = &first[name];
+            let mut bent = own.clone();
+            bent[own.len() / 2] ^= 1;
+            let more = [own, &b"# mine\n"[..]].concat();
+            let less = &own[..own.iter().rposition(|&b| b == b'#').unwrap()];
+            for foreign in [&b""[..], b"mine", less, &bent, &more, &own[1..]] {
+                fs::write(&path, foreign).unwrap();
+                let before = files(folder.path());
+                let error = write(3, Overwrite::Own).unwrap_err().to_string();
+                assert!(error.contains(name) && error.contains("--force"), "{error}");
+                assert!(files(folder.path()) == before);
+            }
+            write(1, Overwrite::All).unwrap();
+            assert!(files(folder.path()) == first);
+        }
+    }
+
+    #[test]
+    fn a_draft_took_the_place_of_a_file_of_the_user() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("bean.can.partial");
+        fs::write(&path, "mine").unwrap();
+        let canopy = Bean::default().generate().unwrap();
+        canopy.write(folder.path(), "bean", Overwrite::All).unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"mine");
     }
 }

@@ -87,6 +87,13 @@ impl Light {
         }
     }
 
+    /// Irradiance of the horizontal above the canopy in a band, all sources together, W m⁻².
+    pub fn irradiance_W_m2(&self, band: usize) -> f64 {
+        let suns: f64 = self.suns.iter().map(|s| s.irradiance_W_m2[band]).sum();
+        let of_sky = |sky: &SkyLight| sky.diffuse_fraction * sky.irradiance_W_m2[band];
+        suns + self.sky.as_ref().map_or(0.0, of_sky)
+    }
+
     /// No light in any band.
     pub fn is_dark(&self) -> bool {
         let suns = self.suns.iter().flat_map(|sun| &sun.irradiance_W_m2);

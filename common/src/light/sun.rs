@@ -7,6 +7,7 @@ use thiserror::Error;
 use toml::value::{Datetime, Offset};
 
 use super::MIN_DESCENT;
+use crate::figures::fixed;
 
 /// The apparent position of the sun above the horizon.
 ///
@@ -145,13 +146,14 @@ pub enum SunError {
 fn too_low(time_utc: &str, latitude_deg: f64, longitude_deg: f64, elevation_deg: f64) -> String {
     let where_and_when =
         format!("at {time_utc}, latitude {latitude_deg}, longitude {longitude_deg}");
+    let elevation = fixed(elevation_deg, 4);
     if elevation_deg < 0.0 {
         format!(
-            "the sun is below the horizon {where_and_when}: its elevation is {elevation_deg:.4} degrees"
+            "the sun is below the horizon {where_and_when}: its elevation is {elevation} degrees"
         )
     } else {
         format!(
-            "the sun is on the horizon {where_and_when}: its elevation is {elevation_deg:.4} degrees, expected 0.0058 \
+            "the sun is on the horizon {where_and_when}: its elevation is {elevation} degrees, expected 0.0058 \
              or more"
         )
     }

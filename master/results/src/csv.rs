@@ -123,7 +123,7 @@ mod tests {
     proptest! {
         #[test]
         fn what_is_written_reads_back(value in proptest::num::f64::NORMAL) {
-            let column = Column { name: "x", cells: Cells::Real(Box::new(move |_| value)) };
+            let column = Column { name: "x", cells: Cells::Real(std::rc::Rc::new(move |_| value)) };
             let text = text_of(&one_column(1, column)).expect("written");
             let read: f64 = text.lines().nth(1).expect("a row").parse().expect("a number");
             prop_assert_eq!(read.to_bits(), value.to_bits());

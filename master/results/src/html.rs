@@ -5,6 +5,7 @@ use std::io::Write;
 use serde::Serialize;
 
 use crate::error::Fault;
+use crate::json;
 
 /// The look of all pages, in the light and in the dark.
 pub(crate) const STYLE: &str = include_str!("page.css");
@@ -28,7 +29,7 @@ pub(crate) fn fill<W: Write>(
 
 /// JSON that cannot end the element that it stands in, whatever names hold.
 pub(crate) fn json(facts: &impl Serialize) -> Result<String, Fault> {
-    Ok(serde_json::to_string(facts)?
+    Ok(json::compact(facts)?
         .replace('<', "\\u003c")
         .replace('>', "\\u003e")
         .replace('&', "\\u0026"))

@@ -19,6 +19,7 @@ mod error;
 mod finite;
 mod folder;
 mod html;
+mod json;
 mod number;
 mod parquet;
 pub mod report;

@@ -7,7 +7,7 @@ use nestrad_engine::stopwatch::{Stage, Usage};
 use serde::Serialize;
 
 use crate::error::Fault;
-use crate::finite;
+use crate::{finite, json};
 
 /// All sections of the summary. What is behind `dyn` is written as whoever computed it describes it.
 ///
@@ -59,7 +59,7 @@ impl Summary<'_> {
     /// it stands.
     pub fn write(&self, out: &mut impl Write) -> Result<(), Fault> {
         finite::check(self)?;
-        serde_json::to_writer_pretty(&mut *out, self)?;
+        json::write_indented(self, out)?;
         out.write_all(b"\n")?;
         Ok(())
     }

@@ -1,5 +1,7 @@
 //! A table, described once: its columns and what stands in them. CSV and Parquet both write from it.
 
+use std::rc::Rc;
+
 use crate::error::Fault;
 use crate::number::{round_to_micrometre, round_to_nine_digits};
 
@@ -18,33 +20,34 @@ pub(crate) struct Column<'a> {
 }
 
 /// The cells of a column, by row.
+#[derive(Clone)]
 pub(crate) enum Cells<'a> {
-    Text(Box<dyn Fn(usize) -> &'a str + 'a>),
-    Index(Box<dyn Fn(usize) -> usize + 'a>),
+    Text(Rc<dyn Fn(usize) -> &'a str + 'a>),
+    Index(Rc<dyn Fn(usize) -> usize + 'a>),
     /// Rounded already, but perhaps not finite: read through [`Column::finite`].
-    Real(Box<dyn Fn(usize) -> f64 + 'a>),
+    Real(Rc<dyn Fn(usize) -> f64 + 'a>),
 }
 
 impl<'a> Column<'a> {
     pub(crate) fn text(name: &'static str, cell: impl Fn(usize) -> &'a str + 'a) -> Self {
-        let cells = Cells::Text(Box::new(cell));
+        let cells = Cells::Text(Rc::new(cell));
         Self { name, cells }
     }
 
     pub(crate) fn index(name: &'static str, cell: impl Fn(usize) -> usize + 'a) -> Self {
-        let cells = Cells::Index(Box::new(cell));
+        let cells = Cells::Index(Rc::new(cell));
         Self { name, cells }
     }
 
     /// A quantity, written with nine significant digits.
     pub(crate) fn quantity(name: &'static str, cell: impl Fn(usize) -> f64 + 'a) -> Self {
-        let cells = Cells::Real(Box::new(move |row| round_to_nine_digits(cell(row))));
+        let cells = Cells::Real(Rc::new(move |row| round_to_nine_digits(cell(row))));
         Self { name, cells }
     }
 
     /// A position in metres, written to the micrometre.
     pub(crate) fn coordinate(name: &'static str, cell: impl Fn(usize) -> f64 + 'a) -> Self {
-        let cells = Cells::Real(Box::new(move |row| round_to_micrometre(cell(row))));
+        let cells = Cells::Real(Rc::new(move |row| round_to_micrometre(cell(row))));
         Self { name, cells }
     }
 

@@ -10,6 +10,7 @@ use std::fmt::Write as _;
 use std::io::{self, Write};
 
 use nestrad_common::canopy::{Canopy, Kind};
+use nestrad_common::figures::fixed;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::solution::{Balance, Estimate, Solution};
 use nestrad_engine::stopwatch::Usage;
@@ -184,15 +185,6 @@ fn shortened_to(name: &str, columns: usize) -> String {
         return name.to_owned();
     }
     name.chars().take(columns - 1).chain(['…']).collect()
-}
-
-/// Fixed decimals, without the minus sign of a zero.
-fn fixed(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(zero) if zero.bytes().all(|byte| matches!(byte, b'0' | b'.')) => zero.to_owned(),
-        _ => text,
-    }
 }
 
 /// A decimal multiple of the watt.

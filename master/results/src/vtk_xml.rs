@@ -19,7 +19,8 @@ pub(crate) enum Values<'a> {
     F64(ByIndex<'a, f64>),
     F32(ByIndex<'a, f32>),
     I64(ByIndex<'a, i64>),
-    U32(ByIndex<'a, u32>),
+    /// Each ends with a zero byte in the file.
+    Text(ByIndex<'a, &'a str>),
 }
 
 impl<'a> Array<'a> {
@@ -33,18 +34,22 @@ impl<'a> Array<'a> {
         }
     }
 
-    /// VTK's name of the type, and the size of a value in bytes.
-    fn kind(&self) -> (&'static str, usize) {
+    /// VTK's names of the element and of the type.
+    fn kind(&self) -> (&'static str, &'static str) {
         match self.values {
-            Values::F64(_) => ("Float64", 8),
-            Values::F32(_) => ("Float32", 4),
-            Values::I64(_) => ("Int64", 8),
-            Values::U32(_) => ("UInt32", 4),
+            Values::F64(_) => ("DataArray", "Float64"),
+            Values::F32(_) => ("DataArray", "Float32"),
+            Values::I64(_) => ("DataArray", "Int64"),
+            Values::Text(_) => ("Array", "String"),
         }
     }
 
     fn bytes(&self) -> usize {
-        self.count * self.kind().1
+        match &self.values {
+            Values::F64(_) | Values::I64(_) => self.count * 8,
+            Values::F32(_) => self.count * 4,
+            Values::Text(value) => (0..self.count).map(|i| value(i).len() + 1).sum(),
+        }
     }
 
     /// The block that the XML's offset points to: length in bytes, then the values.
@@ -54,18 +59,20 @@ impl<'a> Array<'a> {
         match &self.values {
             Values::F64(value) => indices.map(value).try_for_each(|v| {
                 self.finite(v)?;
-                Ok(out.write_all(&v.to_le_bytes())?)
+                // adding zero turns -0 into 0
+                Ok(out.write_all(&(v + 0.0).to_le_bytes())?)
             }),
             Values::F32(value) => indices.map(value).try_for_each(|v| {
                 self.finite(v.into())?;
-                Ok(out.write_all(&v.to_le_bytes())?)
+                Ok(out.write_all(&(v + 0.0).to_le_bytes())?)
             }),
             Values::I64(value) => indices
                 .map(value)
                 .try_for_each(|v| Ok(out.write_all(&v.to_le_bytes())?)),
-            Values::U32(value) => indices
-                .map(value)
-                .try_for_each(|v| Ok(out.write_all(&v.to_le_bytes())?)),
+            Values::Text(value) => indices.map(value).try_for_each(|text| {
+                out.write_all(text.as_bytes())?;
+                Ok(out.write_all(&[0])?)
+            }),
         }
     }
 
@@ -93,9 +100,10 @@ impl Xml {
 
     /// Describes an array that is appended after those described before it.
     pub(crate) fn array(&mut self, array: &Array<'_>) {
+        let (element, kind) = array.kind();
         self.line(&format!(
-            "<DataArray type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{}\"/>",
-            array.kind().0,
+            "<{element} type=\"{}\" Name=\"{}\" NumberOfComponents=\"{}\" format=\"appended\" offset=\"{}\"/>",
+            kind,
             escaped(&array.name),
             array.components,
             self.offset,

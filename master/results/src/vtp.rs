@@ -1,19 +1,19 @@
-//! The triangles as one ParaView file (VTK XML PolyData), coloured by their light.
+//! The triangles as one ParaView file (VTK XML PolyData): all columns of the table of triangles, a cell array
+//! each, light once per band.
 //!
 //! All arrays are appended to the XML as raw little-endian blocks, each after its length in bytes
 //! (UInt64). Points are f64, in the user's coordinates, three per triangle: light belongs to
 //! triangles, so nothing is gained by sharing points. The light itself is f32: it is to be looked
 //! at; the tables hold the figures.
 
-use std::collections::HashMap;
-use std::hash::Hash;
 use std::io::Write;
 
-use nestrad_common::canopy::{Canopy, Organ};
-use nestrad_engine::solution::{ItemLight, Solution};
+use nestrad_common::canopy::Canopy;
+use nestrad_engine::solution::Solution;
 
 use crate::error::Fault;
-use crate::tables::triangle_light_per_m2;
+use crate::table::Cells;
+use crate::tables;
 use crate::vtk_xml::{Array, Values, Xml, escaped};
 
 /// Writes all triangles.
@@ -52,9 +52,9 @@ pub(crate) fn write(
     xml.line("</Points>\n<Polys>");
     polygons.iter().for_each(|array| xml.array(array));
     // the array that ParaView shows first
-    let shown = cells
-        .first()
-        .map_or_else(String::new, |array| escaped(&array.name));
+    let absorbed = |array: &&Array<'_>| array.name.starts_with("absorbed_W_m2 ");
+    let shown = cells.iter().find(absorbed);
+    let shown = shown.map_or_else(String::new, |array| escaped(&array.name));
     xml.line(&format!("</Polys>\n<CellData Scalars=\"{shown}\">"));
     cells.iter().for_each(|array| xml.array(array));
     xml.line("</CellData>\n</Piece>\n</PolyData>");
@@ -83,63 +83,64 @@ fn point_array(canopy: &Canopy) -> Array<'_> {
     points
 }
 
-/// A name with its unit, and the figure.
-type Quantity = (&'static str, fn(ItemLight) -> f64);
-
+/// A row of the table is a triangle in a band: what stands before the column `band` is the triangle's own.
 fn cell_arrays<'a>(
     canopy: &'a Canopy,
-    band_names: &[&str],
+    band_names: &'a [&str],
     solution: &'a Solution,
 ) -> Vec<Array<'a>> {
-    let triangles = canopy.len();
-    let bands = band_names.len();
-    let quantities: [Quantity; 3] = [
-        ("absorbed_W_m2", |light| light.absorbed_W),
-        ("irradiance_upper_W_m2", |light| light.irradiance_upper_W_m2),
-        ("irradiance_lower_W_m2", |light| light.irradiance_lower_W_m2),
-    ];
-    let mut arrays = Vec::with_capacity(3 * bands + 4);
+    let (triangles, bands) = (canopy.len(), band_names.len());
+    let mut columns = tables::triangles(canopy, band_names, solution).columns;
+    let split = columns.iter().position(|column| column.name == "band");
+    let light = columns.split_off(split.unwrap_or(columns.len()));
+    let light = &light[light.len().min(1)..];
+
+    let mut arrays = Vec::with_capacity(light.len() * bands + columns.len());
     for (band, band_name) in band_names.iter().enumerate() {
-        for (quantity, value) in quantities {
-            let cell = move |i| value(triangle_light_per_m2(solution, i, bands, band)) as f32;
-            let name = format!("{quantity} {band_name}");
-            arrays.push(Array::new(name, triangles, Values::F32(Box::new(cell))));
+        for column in light {
+            let name = format!("{} {band_name}", column.name);
+            let values = values(&column.cells, triangles, move |i| i * bands + band);
+            arrays.push(Array::new(name, triangles, values));
         }
     }
-    let plants = numbers(canopy, |organ| (&organ.species, &organ.plant));
-    let species = numbers(canopy, |organ| &organ.species);
-    let kinds = canopy.kinds();
-    let organ = |i: usize| canopy.triangle(i).organ;
-    let plant = move |i: usize| plants[organ(i) as usize];
-    let species = move |i: usize| species[organ(i) as usize];
-    let kind = move |i: usize| kinds[canopy.triangle(i).material as usize] as u32;
-    arrays.push(Array::new("organ", triangles, Values::U32(Box::new(organ))));
-    arrays.push(Array::new("plant", triangles, Values::U32(Box::new(plant))));
-    let cells = Values::U32(Box::new(species));
-    arrays.push(Array::new("species", triangles, cells));
-    // 0 leaf, 1 stem, 2 structure, 3 soil
-    arrays.push(Array::new("kind", triangles, Values::U32(Box::new(kind))));
+    for column in columns {
+        let values = values(&column.cells, triangles, move |i| i * bands);
+        arrays.push(Array::new(column.name, triangles, values));
+    }
     arrays
 }
 
-/// What organs are of, numbered from 0 in the order of its first organ, as organs are in the canopy.
-fn numbers<'a, T: Eq + Hash>(canopy: &'a Canopy, of: impl Fn(&'a Organ) -> T) -> Vec<u32> {
-    let mut numbers: HashMap<T, u32> = HashMap::new();
-    let number = |name| {
-        let next = numbers.len() as u32;
-        *numbers.entry(name).or_insert(next)
-    };
-    canopy.organs.iter().map(of).map(number).collect()
+/// The cells that stand in some rows. Names that are whole numbers, as those of CAN are, become numbers:
+/// ParaView can colour and select by them.
+fn values<'a>(cells: &Cells<'a>, count: usize, row: impl Fn(usize) -> usize + 'a) -> Values<'a> {
+    match cells.clone() {
+        Cells::Text(cell) if (0..count).all(|i| whole_number(cell(row(i))).is_some()) => {
+            Values::I64(Box::new(move |i| {
+                whole_number(cell(row(i))).unwrap_or_default()
+            }))
+        }
+        Cells::Text(cell) => Values::Text(Box::new(move |i| cell(row(i)))),
+        Cells::Index(cell) => Values::I64(Box::new(move |i| cell(row(i)) as i64)),
+        Cells::Real(cell) => Values::F32(Box::new(move |i| cell(row(i)) as f32)),
+    }
+}
+
+/// The number that a name is; 007 is none.
+fn whole_number(name: &str) -> Option<i64> {
+    let number: i64 = name.parse().ok()?;
+    (number.to_string() == name).then_some(number)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use glam::DVec3;
-    use nestrad_common::canopy::{Material, Mesh, Triangle};
+    use nestrad_common::canopy::{Material, Mesh, Organ, Triangle};
+    use nestrad_engine::solution::ItemLight;
 
     const BAND: &str = "<\"blue\" & red>";
 
+    /// Organ c of plant 12, organ a of plant 7: one is named by a number, the other is not.
     fn canopy_and_solution() -> (Canopy, Solution) {
         let organ = |id: &str, plant: &str| Organ {
             species: "1".into(),
@@ -153,14 +154,15 @@ mod tests {
         };
         let triangles = [([DVec3::ZERO, DVec3::X, DVec3::Y], 2), ([DVec3::Z; 3], 0)];
         let mut canopy = Canopy::of_meshes(vec![Mesh::from_iter(triangles.map(triangle))]);
-        canopy.organs = vec![organ("a", "p"), organ("b", "p"), organ("c", "q")];
+        canopy.organs = vec![organ("a", "7"), organ("b", "7"), organ("é\"c", "12")];
         canopy.materials = vec![Material::Stem { species: 1 }];
         canopy.origin_m = DVec3::new(10.0, 20.0, 30.0);
         let light = ItemLight {
             irradiance_upper_W_m2: 4.0,
             irradiance_lower_W_m2: 2.0,
             absorbed_W: 1.5,
-            ..ItemLight::default()
+            absorbed_direct_W: 0.5,
+            absorbed_se_W: 0.25,
         };
         let solution = Solution {
             triangles: vec![light; 2],
@@ -187,7 +189,7 @@ mod tests {
         let mut end = 0;
         let arrays = xml
             .lines()
-            .filter(|line| line.starts_with("<DataArray"))
+            .filter(|line| line.starts_with("<DataArray") || line.starts_with("<Array"))
             .map(|tag| {
                 let offset: usize = attribute(tag, "offset").parse().expect("a number");
                 assert_eq!(offset, end, "no gap and no overlap");
@@ -206,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_reader_finds_all_arrays() {
+    fn ids_were_not_those_of_the_tables_and_columns_were_missing() {
         let (canopy, solution) = canopy_and_solution();
         let mut file = Vec::new();
         write(&canopy, &[BAND], &solution, &mut file).expect("written");
@@ -216,6 +218,7 @@ mod tests {
                 .flat_map(|v| v.to_le_bytes())
                 .collect::<Vec<_>>()
         };
+        let whole = |values: &[i64]| values.iter().flat_map(|v| v.to_le_bytes()).collect();
         let points = [
             10., 20., 30., 11., 20., 30., 10., 21., 30., 10., 20., 31., 10., 20., 31., 10., 20.,
             31.,
@@ -238,7 +241,6 @@ mod tests {
                 "Int64",
                 [3_i64, 6].into_iter().flat_map(i64::to_le_bytes).collect(),
             ),
-            (named("absorbed_W_m2"), "Float32", bytes_of(&[3.0, 0.0])),
             (
                 named("irradiance_upper_W_m2"),
                 "Float32",
@@ -249,26 +251,19 @@ mod tests {
                 "Float32",
                 bytes_of(&[2.0, 0.0]),
             ),
+            (named("absorbed_W_m2"), "Float32", bytes_of(&[3.0, 0.0])),
             (
-                "organ".into(),
-                "UInt32",
-                [2_u32, 0].into_iter().flat_map(u32::to_le_bytes).collect(),
+                named("absorbed_direct_W_m2"),
+                "Float32",
+                bytes_of(&[1.0, 0.0]),
             ),
-            (
-                "plant".into(),
-                "UInt32",
-                [1_u32, 0].into_iter().flat_map(u32::to_le_bytes).collect(),
-            ),
-            (
-                "species".into(),
-                "UInt32",
-                [0_u32, 0].into_iter().flat_map(u32::to_le_bytes).collect(),
-            ),
-            (
-                "kind".into(),
-                "UInt32",
-                [1_u32, 1].into_iter().flat_map(u32::to_le_bytes).collect(),
-            ),
+            (named("absorbed_se_W_m2"), "Float32", bytes_of(&[0.5, 0.0])),
+            ("triangle".into(), "Int64", whole(&[0, 1])),
+            ("species".into(), "Int64", whole(&[1, 1])),
+            ("plant".into(), "Int64", whole(&[12, 7])),
+            ("organ".into(), "String", b"\xc3\xa9\"c\0a\0".to_vec()),
+            ("kind".into(), "String", b"stem\0stem\0".to_vec()),
+            ("area_m2".into(), "Float32", bytes_of(&[0.5, 0.0])),
         ];
         let found = arrays(&file);
         assert_eq!(found.len(), expected.len());

@@ -4,8 +4,9 @@ use anyhow::Result;
 use clap::Args;
 use nestrad_common::assemble::{Examined, examine};
 use nestrad_common::canopy::Canopy;
+use nestrad_common::figures::fixed;
 use nestrad_common::inspection::{Inspection, MaterialFacts, SunFacts};
-use nestrad_common::light::{Light, SkyLight};
+use nestrad_common::light::Light;
 use nestrad_common::optics::{FaceOptics, Optics};
 use nestrad_common::options::Options;
 
@@ -86,10 +87,9 @@ impl Facts {
         self.line("", &areas);
         let [low, high] = [facts.lower_m, facts.upper_m];
         let ranges: Vec<String> = (0..3)
-            // adding zero turns -0 into 0
-            .map(|k| [low[k], high[k]].map(|x| (x * 1e3).round() / 1e3 + 0.0))
+            .map(|k| [low[k], high[k]].map(|x| fixed(x, 3)))
             .zip(["x", "y", "z"])
-            .map(|([low, high], axis)| format!("{axis} {low:.3} to {high:.3} m"))
+            .map(|([low, high], axis)| format!("{axis} {low} to {high} m"))
             .collect();
         self.line("extent", &ranges.join(", "));
         let pattern = match facts.pattern_m {
@@ -101,7 +101,7 @@ impl Facts {
         };
         self.line("pattern", &pattern);
         let soil = match facts.soil_z_m {
-            Some(z) => format!("a plane at z = {z:.3} m"),
+            Some(z) => format!("a plane at z = {} m", fixed(z, 3)),
             None => "no plane: a black void below".to_owned(),
         };
         self.line("soil", &soil);
@@ -110,13 +110,15 @@ impl Facts {
                 Some(_) => "ground",
                 None => "the box around the scene",
             };
-            let index = format!("{index:.3} m² of leaves and stems, one-sided, per m² of {ground}");
+            let index = fixed(index, 3);
+            let index = format!("{index} m² of leaves and stems, one-sided, per m² of {ground}");
             self.line("area", &index);
         }
         for material in &facts.materials {
             let (triangles, area_m2) = (material.triangles, material.area_m2);
+            let area_m2 = fixed(area_m2, 4);
             let MaterialFacts { name, kind, .. } = material;
-            let text = format!("{name}: {triangles} triangles, {area_m2:.4} m², {kind}");
+            let text = format!("{name}: {triangles} triangles, {area_m2} m², {kind}");
             self.line("material", &text);
         }
     }
@@ -142,14 +144,9 @@ impl Facts {
 
     fn light(&mut self, light: &Light, bands: &[String]) {
         let Light { suns, sky } = light;
-        let sum = |band: usize| {
-            let of_sky = |sky: &SkyLight| sky.diffuse_fraction * sky.irradiance_W_m2[band];
-            let of_suns: f64 = suns.iter().map(|s| s.irradiance_W_m2[band]).sum();
-            of_suns + sky.as_ref().map_or(0.0, of_sky)
-        };
         let totals = bands.iter().enumerate().map(|(b, name)| {
             let name = if name.is_empty() { "every band" } else { name };
-            format!("{name} {:.2} W m⁻²", sum(b))
+            format!("{name} {} W m⁻²", fixed(light.irradiance_W_m2(b), 2))
         });
         let totals = totals.collect::<Vec<_>>().join(", ");
         let s = if suns.len() == 1 { "" } else { "s" };

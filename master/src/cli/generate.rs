@@ -1,13 +1,13 @@
 //! `nestrad generate`: made-up canopies, with all that it takes to solve them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::str::FromStr;
 
 use anyhow::Result;
 use clap::{Args, Subcommand, ValueEnum};
 use glam::DVec2;
 use nestrad_common::generate::{
-    Bean, Generated, LeafAngles, LeafShape, Maize, RandomCanopy, Stand,
+    Bean, Generated, LeafAngles, LeafShape, Maize, Overwrite, RandomCanopy, Stand,
 };
 
 use super::console;
@@ -15,7 +15,8 @@ use super::numbers::{number, whole};
 
 /// Write a made-up canopy, with optics, light and a scene file, for `nestrad solve DIR/scene.toml`
 ///
-/// The same options give the same files, byte for byte. Plants are plausible, not calibrated on any
+/// The same options give the same files, byte for byte. Files of an earlier canopy are replaced as long as
+/// nobody has changed them; others stay, and nothing is written, unless --force is given. Plants are plausible, not calibrated on any
 /// cultivar. Lengths are in metres.
 #[derive(Debug, Args)]
 pub(crate) struct GenerateArgs {
@@ -39,9 +40,23 @@ struct Place {
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
+    /// Overwrite files of the same names that something else has made, or that were changed since
+    #[arg(long)]
+    force: bool,
+
     /// Another seed, other plants
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: u64,
+}
+
+impl Place {
+    fn overwrite(&self) -> Overwrite {
+        if self.force {
+            Overwrite::All
+        } else {
+            Overwrite::Own
+        }
+    }
 }
 
 #[derive(Debug, Args)]
@@ -116,7 +131,7 @@ impl GenerateArgs {
                     leaf_triangle_m2: flags.leaf_triangle.unwrap_or(default.leaf_triangle_m2),
                     seed: flags.place.seed,
                 };
-                write(&canopy.generate()?, &flags.place.out, "maize")
+                write(&canopy.generate()?, &flags.place, "maize")
             }
             Canopy::Bean(flags) => {
                 let default = Bean::default();
@@ -125,7 +140,7 @@ impl GenerateArgs {
                     leaf_triangle_m2: flags.leaf_triangle.unwrap_or(default.leaf_triangle_m2),
                     seed: flags.place.seed,
                 };
-                write(&canopy.generate()?, &flags.place.out, "bean")
+                write(&canopy.generate()?, &flags.place, "bean")
             }
             Canopy::Random(flags) => {
                 let canopy = RandomCanopy {
@@ -140,7 +155,7 @@ impl GenerateArgs {
                     height_m: flags.height,
                     seed: flags.place.seed,
                 };
-                write(&canopy.generate()?, &flags.place.out, "leaves")
+                write(&canopy.generate()?, &flags.place, "leaves")
             }
         }
     }
@@ -158,8 +173,9 @@ impl PlantFlags {
 }
 
 /// Writes the files, and says so.
-fn write(canopy: &Generated, folder: &Path, name: &str) -> Result<()> {
-    canopy.write(folder, name)?;
+fn write(canopy: &Generated, place: &Place, name: &str) -> Result<()> {
+    let folder = &place.out;
+    canopy.write(folder, name, place.overwrite())?;
     let size_m = canopy.pattern.size_m;
     let text = format!(
         "{place}: {triangles} triangles, leaf area index {lai:.2}, on {x:.3} m x {y:.3} m\n\

@@ -1,12 +1,15 @@
 //! The options of a run as its summary keeps them, defaults included.
 
+use std::path::Path;
+
 use nestrad_common::inputs::{Inputs, LightInput, PatternInput};
-use nestrad_common::light::Sky;
+use nestrad_common::light::{Light, Sky};
 use nestrad_common::options::{Diameter, TableFormat, Unit, Up};
 use nestrad_engine::plan::{Estimator, Settings};
 use serde::Serialize;
 
-/// What was asked for. Files are as the user named them.
+/// What was asked for. Geometry, pattern and optics have their absolute paths, by which they are found from any
+/// folder; the light is in the user's words.
 #[derive(Debug, Serialize)]
 pub(crate) struct OptionsRecord {
     scenes: Vec<String>,
@@ -35,39 +38,44 @@ pub(crate) struct OptionsRecord {
 struct BandRecord {
     name: String,
     optics: Option<String>,
+    /// Of the horizontal above the canopy.
+    irradiance_W_m2: f64,
 }
 
 impl OptionsRecord {
     /// To be called where the work is done, if not at a master: it counts the threads there.
     pub(crate) fn new(
         inputs: &Inputs,
+        light: &Light,
         settings: &Settings,
         sources: usize,
         master: Option<&str>,
     ) -> Self {
         let options = &inputs.options;
         Self {
-            scenes: inputs
-                .scenes
-                .iter()
-                .map(|p| p.display().to_string())
-                .collect(),
+            scenes: inputs.scenes.iter().map(|path| absolute(path)).collect(),
             unit: inputs.unit.unwrap_or_default(),
             up: inputs.up.unwrap_or_default(),
             pattern: inputs.pattern.as_ref().map(|pattern| match pattern {
-                PatternInput::File(path) => path.display().to_string(),
-                PatternInput::Corners(corners) => corners.map(|c| c.to_string()).join(" "),
+                PatternInput::File(path) => absolute(path),
+                PatternInput::Corners(corners) => corners.map(|c| (c + 0.0).to_string()).join(" "),
             }),
             soil: inputs.soil,
             bands: inputs
                 .bands
                 .iter()
-                .map(|band| BandRecord {
+                .enumerate()
+                .map(|(number, band)| BandRecord {
+                    irradiance_W_m2: light.irradiance_W_m2(number),
                     name: band.name.clone(),
-                    optics: band.optics.as_ref().map(|path| path.display().to_string()),
+                    optics: band.optics.as_deref().map(absolute),
                 })
                 .collect(),
-            light: inputs.light.as_ref().map(light).unwrap_or_default(),
+            light: inputs
+                .light
+                .as_ref()
+                .map(light_in_words)
+                .unwrap_or_default(),
             sources,
             diameter: settings.diameter,
             accuracy_percent: settings.accuracy_percent,
@@ -82,8 +90,15 @@ impl OptionsRecord {
     }
 }
 
+/// Where a file is, from wherever one looks.
+fn absolute(path: &Path) -> String {
+    // the current folder may be gone: what the user said is all that there is then
+    let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
+    whole.display().to_string()
+}
+
 /// The light in words.
-pub(crate) fn light(light: &LightInput) -> String {
+fn light_in_words(light: &LightInput) -> String {
     match light {
         LightInput::File(path) => path.display().to_string(),
         LightInput::Files(files) => {

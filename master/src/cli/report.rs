@@ -14,7 +14,7 @@ use super::numbers::whole;
 /// Turn the results of `solve` into one HTML page: the canopy in 3D, profiles, balance, errors
 ///
 /// Writes OUT/report.html, which holds all that it shows and loads nothing: it can be sent by mail.
-/// Results are read from CSV tables, the canopy from where summary.json says that it was.
+/// Results are read from their tables, CSV or Parquet, the canopy from where summary.json says that it was.
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
     /// Folder of results, as `nestrad solve --out` wrote it
@@ -40,7 +40,7 @@ pub(crate) struct ReportArgs {
     png_band: Option<String>,
 
     /// Nothing on the terminal but errors
-    #[arg(long)]
+    #[arg(long, short)]
     quiet: bool,
 }
 

@@ -292,7 +292,13 @@ impl Task {
         let stages: Vec<Stage> = elsewhere.chain(watch.stages().iter().cloned()).collect();
         staged.commit(&Summary {
             version: env!("CARGO_PKG_VERSION"),
-            options: &OptionsRecord::new(&self.inputs, &self.settings, sources, master),
+            options: &OptionsRecord::new(
+                &self.inputs,
+                &scene.light,
+                &self.settings,
+                sources,
+                master,
+            ),
             scene: inspection,
             plan: &solved.plan,
             energy_balance: &solution.balance,

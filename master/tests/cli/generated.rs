@@ -91,3 +91,33 @@ fn what_no_canopy_can_be_made_from_is_refused() {
     }
     assert!(!desk.path("demo").exists());
 }
+
+#[test]
+fn files_of_the_user_were_overwritten() {
+    let desk = Desk::new();
+    let rows = ["--rows", "1x1", "--leaf-triangle", "1e-3", "--out", "demo"];
+    let generate = |more: &[&str]| desk.run(&[&["generate", "maize"], &rows[..], more].concat());
+    assert_eq!(generate(&[]).code, Some(0));
+    // another canopy over one that nobody has touched, and back
+    assert_eq!(generate(&["--seed", "2"]).code, Some(0));
+    assert_eq!(generate(&[]).code, Some(0));
+    let before = files(&desk.path("demo"));
+
+    desk.put("demo/par.opt", desk.text("demo/par.opt") + "# mine\n");
+    let changed = files(&desk.path("demo"));
+    for seed in ["1", "2"] {
+        let ran = generate(&["--seed", seed]);
+        assert_eq!(ran.code, Some(1));
+        let wanted = "demo/par.opt: was not made by nestrad generate, or was changed since; expected --force";
+        assert!(ran.stderr.contains(wanted), "{}", ran.stderr);
+        assert!(files(&desk.path("demo")) == changed);
+    }
+    assert_eq!(generate(&["--force"]).code, Some(0));
+    assert!(files(&desk.path("demo")) == before);
+
+    // a file of the same name in a folder of one's own
+    let ran = desk.run(&["generate", "maize", "--out", "."]);
+    assert_eq!(ran.code, Some(1));
+    assert!(ran.stderr.contains("par.opt"), "{}", ran.stderr);
+    assert!(!desk.path("maize.can").exists());
+}

@@ -8,6 +8,7 @@ mod generated;
 mod help;
 mod inputs;
 mod kinds;
+mod minus_zero;
 mod refusals;
 mod results;
 mod trades;

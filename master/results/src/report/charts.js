@@ -6,21 +6,27 @@ function html(text) {
   return String(text).replace(/[&<>"]/g, (character) => AND[character]);
 }
 
+// With so many decimals. What rounds to zero has no sign.
+function fixed(value, decimals) {
+  const text = value.toFixed(decimals);
+  return Number(text) === 0 ? text.replace('-', '') : text;
+}
+
 // With as many digits as mean something.
 function figure(value, digits = 4) {
   if (value === 0) return '0';
   const size = Math.abs(value);
-  if (size < 1e-4 || size >= 1e6) return value.toExponential(2);
-  return value.toFixed(Math.max(0, Math.min(8, digits - 1 - Math.floor(Math.log10(size)))));
+  if (size < 1e-4 || size >= 1e6) return value.toExponential(digits - 2);
+  return fixed(value, Math.max(0, Math.min(8, digits - 1 - Math.floor(Math.log10(size)))));
 }
 
 // A value and its standard error to the same decimal, the error to two digits.
 function withError(value, se) {
   if (!(se > 0)) return figure(value);
   const decimals = Math.max(0, Math.min(8, 1 - Math.floor(Math.log10(se))));
-  const error = se.toFixed(decimals);
+  const error = fixed(se, decimals);
   if (Number(error) === 0) return figure(value);
-  return `${value.toFixed(decimals)} <span class="se">± ${error}</span>`;
+  return `${fixed(value, decimals)} <span class="se">± ${error}</span>`;
 }
 
 function table(heading, rows) {
@@ -38,9 +44,13 @@ function roundTop(value) {
 // Bars along the height, under a title in HTML. layers: {low_m, high_m}; parts: lists of values with a class
 // each, end to end.
 function heightChart(title, unit, layers, parts) {
-  const [width, height, left, top, bottom] = [300, 240, 42, 8, 34];
+  const [width, height, top, bottom] = [300, 240, 8, 34];
   const low = layers[0].low_m;
   const span = layers[layers.length - 1].high_m - low || 1;
+  const decimals = Math.max(0, Math.min(6, 2 - Math.floor(Math.log10(span))));
+  const heights = [0, 0.5, 1].map((part) => fixed(low + span * part, decimals));
+  // room for the longest of them
+  const left = 12 + 6.5 * Math.max(...heights.map((text) => text.length));
   const totals = layers.map((_, k) => parts.reduce((sum, part) => sum + part.values[k], 0));
   const most = roundTop(Math.max(...totals));
   const inside = height - top - bottom;
@@ -56,31 +66,24 @@ function heightChart(title, unit, layers, parts) {
       from = to;
     }
   });
-  for (const part of [0, 0.5, 1]) {
-    shapes += `<text x="${x(most * part)}" y="${height - bottom + 14}" text-anchor="middle">${figure(most * part, 2)}</text>`;
-    shapes += `<text x="${left - 5}" y="${y(low + span * part) + 4}" text-anchor="end">${(low + span * part).toFixed(2)}</text>`;
-  }
+  [0, 0.5, 1].forEach((part, k) => {
+    const anchor = ['start', 'middle', 'end'][k];
+    shapes += `<text x="${x(most * part)}" y="${height - bottom + 14}" text-anchor="${anchor}">${figure(most * part, 2)}</text>`;
+    shapes += `<text x="${left - 5}" y="${y(low + span * part) + 4}" text-anchor="end">${heights[k]}</text>`;
+  });
   shapes += `<path class="axis" fill="none" d="M${left} ${top}V${height - bottom}H${width - 12}"/>`;
   shapes += `<text x="${(left + width - 12) / 2}" y="${height - 4}" text-anchor="middle">${html(unit)}</text>`;
-  return `<figure style="margin:0"><h3>${title}</h3><svg viewBox="0 0 ${width} ${height}" role="img" aria-label="by height, ${unit}">${shapes}</svg></figure>`;
+  return `<figure><h3>${title}</h3><svg viewBox="0 0 ${width} ${height}" role="img" aria-label="by height, ${unit}">${shapes}</svg></figure>`;
 }
 
-// One bar a band with its standard error.
-function errorBars(rows, unit) {
-  const [width, left, right, step] = [300, 52, 10, 26];
+// One bar a band with its standard error; names and numbers are text, which wraps as it must.
+function errorBars(rows) {
   const most = roundTop(Math.max(...rows.map((row) => row.value + row.se)));
-  const x = (value) => left + (width - left - right) * Math.max(0, Math.min(1, value / most));
-  let shapes = '';
-  rows.forEach((row, k) => {
-    const y = k * step + 4;
-    const [from, to, middle] = [x(row.value - row.se), x(row.value + row.se), y + 8];
-    shapes += `<text x="${left - 6}" y="${y + 12}" text-anchor="end">${html(row.name.slice(0, 8))}</text>`;
-    shapes += `<rect class="bar" x="${left}" y="${y}" width="${x(row.value) - left}" height="16"/>`;
-    shapes += `<path class="error" d="M${from} ${middle}H${to}M${from} ${y + 3}v10M${to} ${y + 3}v10"/>`;
-  });
-  const bottom = rows.length * step + 4;
-  shapes += `<path class="axis" d="M${left} ${bottom}H${width - right}"/>`;
-  shapes += `<text x="${left}" y="${bottom + 14}">0</text>`;
-  shapes += `<text x="${width - right}" y="${bottom + 14}" text-anchor="end">${figure(most, 2)} ${unit}</text>`;
-  return `<svg viewBox="0 0 ${width} ${bottom + 20}" role="img" aria-label="absorbed light with standard errors">${shapes}</svg>`;
+  const part = (value) => 100 * Math.max(0, Math.min(1, value / most));
+  return rows.map((row) => {
+    const [from, to] = [part(row.value - row.se), part(row.value + row.se)];
+    return `<div class="barred"><span>${html(row.name)}</span><span>${withError(row.value, row.se)}</span>` +
+      `<div class="track"><div class="fill" style="width:${part(row.value)}%"></div>` +
+      `<div class="whisker" style="left:${from}%;width:${to - from}%"></div></div></div>`;
+  }).join('');
 }

@@ -36,17 +36,46 @@ pub(crate) struct OptionFacts {
     pub(crate) up: Up,
     pub(crate) light: String,
     pub(crate) sources: usize,
+    pub(crate) bands: Vec<BandFacts>,
     pub(crate) accuracy_percent: f64,
     pub(crate) seed: u64,
+}
+
+/// A band as it was asked for.
+#[derive(Clone, Debug, Deserialize)]
+pub(crate) struct BandFacts {
+    /// Of the horizontal above the canopy; results of an earlier version do not have it.
+    pub(crate) irradiance_W_m2: Option<f64>,
 }
 
 /// The scene in short.
 #[derive(Clone, Debug, Deserialize)]
 pub(crate) struct SceneFacts {
+    pub(crate) lower_m: [f64; 3],
+    pub(crate) upper_m: [f64; 3],
     pub(crate) pattern_m: Option<[f64; 2]>,
     pub(crate) soil_z_m: Option<f64>,
     pub(crate) plants: usize,
     pub(crate) area_index: Option<f64>,
+}
+
+impl SceneFacts {
+    /// Extent of the pattern, or of the box around a scene that stands alone.
+    pub(crate) fn ground_m(&self) -> [f64; 2] {
+        let side = |axis: usize| self.upper_m[axis] - self.lower_m[axis];
+        self.pattern_m.unwrap_or([side(0), side(1)])
+    }
+}
+
+impl SummaryFacts {
+    /// Irradiance of the horizontal above the canopy, per band.
+    pub(crate) fn above_W_m2(&self) -> Vec<f64> {
+        let ground_m2 = self.plan.scale.ground_area_m2;
+        let bands = self.options.bands.iter().zip(&self.energy_balance);
+        bands
+            .map(|(band, b)| band.irradiance_W_m2.unwrap_or(b.incoming_W / ground_m2))
+            .collect()
+    }
 }
 
 /// What the plan said.
@@ -133,19 +162,13 @@ const PLANTS: [&str; 2] = ["leaf", "stem"];
 /// Reads a folder of results.
 pub(crate) fn read(folder: &Path) -> Result<Results, ReportError> {
     let summary = summary(folder)?;
-    let is_there = |name: &str| folder.join(name).exists();
-    if is_there("triangles.parquet") && !is_there("triangles.csv") {
-        let folder = folder.to_owned();
-        return Err(ReportError::Parquet { folder });
-    }
     let balance = summary.energy_balance.iter();
     let bands: Vec<String> = balance.map(|balance| balance.band.clone()).collect();
     let organs = organs(folder, &bands)?;
     let triangles = triangles(folder, &bands, &organs)?;
-    let soil = if is_there("soil.csv") {
-        soil(folder, &bands)?
-    } else {
-        None
+    let soil = match Table::find(folder, "soil")? {
+        Some(table) => soil(&table, &bands)?,
+        None => None,
     };
     Ok(Results {
         summary,
@@ -170,6 +193,10 @@ fn summary(folder: &Path) -> Result<SummaryFacts, ReportError> {
         if summary.energy_balance.is_empty() {
             return Err(serde_json::Error::custom("energy_balance has no bands"));
         }
+        if summary.options.bands.len() != summary.energy_balance.len() {
+            let fault = "options and energy_balance have different numbers of bands";
+            return Err(serde_json::Error::custom(fault));
+        }
         Ok(summary)
     });
     read.map_err(|source| ReportError::Summary { path, source })
@@ -191,15 +218,15 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
     ];
     let mut organs: Vec<Organ> = Vec::new();
     let mut rows = 0;
-    let table = Table::read(folder.join("organs.csv"))?;
+    let table = Table::open(folder, "organs")?;
     table.rows(&columns, |row| {
         row.must_be(5, &bands[rows % bands.len()])?;
         if rows.is_multiple_of(bands.len()) {
             organs.push(Organ {
-                species: row.text(0).to_owned(),
-                plant: row.text(1).to_owned(),
-                organ: row.text(2).to_owned(),
-                kind: row.text(3).to_owned(),
+                species: row.text(0).into_owned(),
+                plant: row.text(1).into_owned(),
+                organ: row.text(2).into_owned(),
+                kind: row.text(3).into_owned(),
                 area_m2: row.real(4)?,
                 light: Vec::with_capacity(bands.len()),
             });
@@ -246,23 +273,24 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
         [species, plant, organ].map(String::as_str)
     });
     let by_name: HashMap<[&str; 3], u32> = names.zip(0..).collect();
+    let table = Table::open(folder, "triangles")?;
     let mut found = Triangles::default();
-    let table = Table::read(folder.join("triangles.csv"))?;
     table.rows(&columns, |row| {
         let (triangle, band) = (
             found.light.len() / bands.len(),
             found.light.len() % bands.len(),
         );
         if row.index(0)? != triangle {
-            return Err(row.not(&format!("triangle {triangle}"), row.text(0)));
+            return Err(row.not(&format!("triangle {triangle}"), &row.text(0)));
         }
         row.must_be(6, &bands[band])?;
         if band == 0 {
             let name = [1, 2, 3].map(|column| row.text(column));
-            let organ = by_name.get(&name).copied();
-            let organ = organ.ok_or_else(|| row.not("an organ of organs.csv", row.text(3)))?;
+            let organ = by_name.get(&name.each_ref().map(|name| &**name)).copied();
+            let organ =
+                organ.ok_or_else(|| row.not("an organ of the table of organs", &row.text(3)))?;
             found.organ.push(organ);
-            found.plant.push(PLANTS.contains(&row.text(4)));
+            found.plant.push(PLANTS.contains(&&*row.text(4)));
             found.area_m2.push(row.real(5)?);
         }
         found.light.push(PatchLight {
@@ -278,7 +306,7 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
     Ok(found)
 }
 
-fn soil(folder: &Path, bands: &[String]) -> Result<Option<Soil>, ReportError> {
+fn soil(table: &Table, bands: &[String]) -> Result<Option<Soil>, ReportError> {
     let columns = [
         "ix",
         "iy",
@@ -291,7 +319,6 @@ fn soil(folder: &Path, bands: &[String]) -> Result<Option<Soil>, ReportError> {
     ];
     let mut soil: Option<Soil> = None;
     let mut rows = 0;
-    let table = Table::read(folder.join("soil.csv"))?;
     table.rows(&columns, |row| {
         let band = rows % bands.len();
         row.must_be(6, &bands[band])?;
@@ -305,13 +332,16 @@ fn soil(folder: &Path, bands: &[String]) -> Result<Option<Soil>, ReportError> {
             irradiance_W_m2: vec![Vec::new(); bands.len()],
         });
         // cells come row by row: the last one has the largest numbers
-        (soil.nx, soil.ny) = (row.index(0)? + 1, row.index(1)? + 1);
+        let [ix, iy] = [row.index(0)?, row.index(1)?];
+        (soil.nx, soil.ny) = (ix.saturating_add(1), iy.saturating_add(1));
         soil.irradiance_W_m2[band].push(row.real(7)? as f32);
         rows += 1;
         Ok(())
     })?;
-    let cells = soil.as_ref().map_or(0, |soil| soil.nx * soil.ny);
-    if rows != cells * bands.len() {
+    let cells = soil
+        .as_ref()
+        .map_or(0, |soil| soil.nx.saturating_mul(soil.ny));
+    if rows != cells.saturating_mul(bands.len()) {
         return Err(table.is_cut_off(rows));
     }
     Ok(soil)

@@ -4,6 +4,7 @@ use std::io;
 use std::path::PathBuf;
 
 use nestrad_common::assemble::LoadError;
+use parquet::errors::ParquetError;
 use thiserror::Error;
 
 use crate::error::OutputError;
@@ -26,14 +27,22 @@ pub enum ReportError {
         /// The folder.
         folder: PathBuf,
     },
-    /// The tables are Parquet.
-    #[error(
-        "{}: the tables are Parquet, but a report is made of CSV: solve again with --format csv",
-        folder.display()
-    )]
-    Parquet {
+    /// A table is missing.
+    #[error("{}: expected {name}.csv or {name}.parquet, found neither", folder.display())]
+    NoTable {
         /// The folder.
         folder: PathBuf,
+        /// The table.
+        name: String,
+    },
+    /// A Parquet table cannot be read.
+    #[error("{}: expected a Parquet table", path.display())]
+    Parquet {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong.
+        #[source]
+        source: ParquetError,
     },
     /// The summary is not what a solve writes.
     #[error("{}: not the summary of a solve", path.display())]

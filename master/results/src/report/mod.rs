@@ -3,10 +3,11 @@
 
 mod data;
 mod error;
-mod letters;
 mod page;
 mod picture;
 pub mod profile;
+mod record;
+mod scale;
 mod table;
 
 use std::fs;
@@ -24,14 +25,13 @@ pub use self::error::ReportError;
 use self::data::{Organ, Results, Soil, SpreadFacts};
 use self::page::Blob;
 use self::profile::{LIT_STEP, Layer, Patch};
+use self::scale::Scale;
 use crate::atomic::Staging;
 use crate::error::OutputError;
 use crate::folder::REPORT;
 
 /// Layers of the vertical profile.
 const LAYERS: usize = 20;
-/// The part of the area that may be brighter than the colour scale goes: triangles are noisy.
-const OFF_SCALE: f64 = 0.005;
 /// Triangles whose areas differ by more, relatively, are not the same: tables have nine digits.
 const SAME_AREA: f64 = 1e-6;
 
@@ -81,7 +81,9 @@ struct Facts<'a> {
     plants: usize,
     area_index: Option<f64>,
     periodic: bool,
-    ground_area_m2: f64,
+    /// Of the pattern, or of the box around a scene that stands alone: what `area_index` and the profiles
+    /// are per area of.
+    ground_m: [f64; 2],
     resources: &'a serde_json::Value,
     balance: &'a [Balance],
     errors: &'a [SpreadFacts],
@@ -91,14 +93,23 @@ struct Facts<'a> {
     organs: &'a [Organ],
     layers: &'a [Layer],
     lit_step: f64,
-    /// Upper ends of the colour scales, per band.
-    scale_W_m2: Vec<f64>,
+    /// Per band.
+    scales: Vec<Scales<'a>>,
     triangles: usize,
     not_drawn: Option<&'a str>,
     /// Subtracted from all coordinates of the drawing.
     origin_m: [f64; 3],
     soil: Option<&'a Soil>,
     soil_z_m: Option<f64>,
+}
+
+/// The colour scales of a band.
+#[derive(Serialize)]
+struct Scales<'a> {
+    /// Of triangles.
+    triangle: &'a Scale,
+    /// Of the means of organs, which are less far apart.
+    organ: Scale,
 }
 
 /// Reads a folder of results and writes a page into it.
@@ -120,19 +131,16 @@ pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
 
     let patches = patches(&canopy, &results);
     let summary = &results.summary;
-    let ground_m2 = summary.plan.scale.ground_area_m2;
-    let balance = &summary.energy_balance;
-    let above: Vec<f64> = balance.iter().map(|b| b.incoming_W / ground_m2).collect();
-    let scale_W_m2: Vec<f64> = (0..results.bands.len())
+    let scales: Vec<Scale> = (0..results.bands.len())
         .map(|band| {
             let values = patches.iter();
-            let values = values.map(|p| (p.light[band].absorbed_W_m2, p.area_m2));
-            profile::scale_top(values, OFF_SCALE)
+            Scale::of(values.map(|p| (p.light[band].absorbed_W_m2, p.area_m2)))
         })
         .collect();
     if let Some((path, band)) = picture {
-        write_picture(path, &canopy, &results, band, scale_W_m2[band])?;
+        write_picture(path, &canopy, &results, band, &scales[band])?;
     }
+    let plants = plants(&results);
     let title = title(&summary.options.scenes);
     let facts = Facts {
         title: &title,
@@ -145,16 +153,22 @@ pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
         plants: summary.scene.plants,
         area_index: summary.scene.area_index,
         periodic: summary.scene.pattern_m.is_some(),
-        ground_area_m2: ground_m2,
+        ground_m: summary.scene.ground_m(),
         resources: &summary.resources,
-        balance,
+        balance: &summary.energy_balance,
         errors: &summary.error_estimates,
         account: summary.plan.accuracy.as_ref().map_or(&[], |a| &a.errors),
         reasons: &summary.plan.reasons,
         organs: &results.organs,
-        layers: &profile::layers(&patches, &above, LAYERS),
+        layers: &profile::layers(&patches, &summary.above_W_m2(), LAYERS),
         lit_step: LIT_STEP,
-        scale_W_m2,
+        scales: (0..)
+            .zip(&scales)
+            .map(|(band, triangle)| Scales {
+                triangle,
+                organ: organ_scale(&results.organs, &plants, band),
+            })
+            .collect(),
         triangles,
         not_drawn: not_drawn.as_deref(),
         origin_m: canopy.origin_m.to_array(),
@@ -194,14 +208,11 @@ fn write_picture(
     canopy: &Canopy,
     results: &Results,
     band: usize,
-    top: f64,
+    scale: &Scale,
 ) -> Result<(), ReportError> {
     let bands = results.bands.len();
-    let value = |t: usize| {
-        let absorbed = results.triangles.light[t * bands + band].absorbed_W_m2;
-        if top > 0.0 { absorbed / top } else { 0.0 }
-    };
-    let picture = picture::draw(canopy.corners_m(), value, top, &results.bands[band]);
+    let value = |t: usize| scale.part(results.triangles.light[t * bands + band].absorbed_W_m2);
+    let picture = picture::draw(canopy.corners_m(), value, scale, &results.bands[band]);
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
@@ -229,13 +240,10 @@ fn canopy(request: &Request<'_>, results: &Results) -> Result<Canopy, ReportErro
     match difference(&canopy, results) {
         None => Ok(canopy),
         Some(what) => Err(ReportError::OtherScene {
-            scene: title(
-                &inputs
-                    .scenes
-                    .iter()
-                    .map(|p| p.display().to_string())
-                    .collect::<Vec<_>>(),
-            ),
+            scene: {
+                let paths = inputs.scenes.iter().map(|p| p.display().to_string());
+                paths.collect::<Vec<_>>().join(", ")
+            },
             out: request.out.to_owned(),
             what,
         }),
@@ -265,8 +273,33 @@ fn difference(canopy: &Canopy, results: &Results) -> Option<String> {
     })
 }
 
+/// The names of the files, without where they are.
 fn title(scenes: &[String]) -> String {
-    scenes.join(", ")
+    let name = |scene: &String| {
+        let name = Path::new(scene).file_name();
+        name.map_or_else(|| scene.clone(), |name| name.to_string_lossy().into_owned())
+    };
+    scenes.iter().map(name).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether each organ is of a plant: some of it is leaf or stem.
+fn plants(results: &Results) -> Vec<bool> {
+    let mut plants = vec![false; results.organs.len()];
+    let of_triangles = results.triangles.organ.iter().zip(&results.triangles.plant);
+    for (&organ, &plant) in of_triangles {
+        plants[organ as usize] |= plant;
+    }
+    plants
+}
+
+/// The scale of what organs absorb per area of their own.
+fn organ_scale(organs: &[Organ], plants: &[bool], band: usize) -> Scale {
+    let shown = organs.iter().zip(plants);
+    let shown = shown.filter(|(organ, plant)| **plant && organ.area_m2 > 0.0);
+    Scale::of(shown.map(|(organ, _)| {
+        let absorbed_W_m2 = organ.light[band].absorbed_W / organ.area_m2;
+        (absorbed_W_m2, organ.area_m2)
+    }))
 }
 
 /// All triangles of plants.

@@ -13,7 +13,7 @@ function numbers(id, Kind) {
   return new Kind(bytes.buffer);
 }
 
-const state = { band: 0, by: 'triangle', picked: -1, view: null, absorbed: [], organs: null };
+const state = { band: 0, by: 'triangle', scaling: 'log', picked: -1, view: null, absorbed: [], organs: null };
 
 // Values of the drawing in W per m² of leaf, per triangle.
 function shownValues() {
@@ -24,16 +24,18 @@ function shownValues() {
 }
 
 function recolour() {
-  const top = report.scale_W_m2[state.band];
+  const scale = report.scales[state.band][state.by];
+  const how = state.scaling;
   const soil = report.soil ? report.soil.irradiance_W_m2[state.band] : [];
   const most = soil.reduce((a, b) => Math.max(a, b), 0);
-  const ticks = [0, 0.25, 0.5, 0.75, 1].map((part) => `<span>${part === 1 ? '≥ ' : ''}${figure(top * part, 3)}</span>`);
+  const ticks = TICKS.map((part) => `<span>${tickText(part, scale, how)}</span>`);
+  const each = state.by === 'triangle' ? '' : ', mean of an organ';
+  const note = { log: 'logarithmic', linear: 'linear', quantiles: 'equal leaf areas have equal parts of the scale' }[how];
   element('scale').innerHTML = `<div class="ramp"><div style="background:linear-gradient(to right,${COLOURS.join(',')})"></div>` +
-    `<p>${ticks.join('')}</p></div><p>W absorbed per m² of leaf in ${html(report.bands[state.band])}` +
+    `<p>${ticks.join('')}</p></div><p>W absorbed per m² of leaf in ${html(report.bands[state.band])}${each} <span class="se">(${note})</span>` +
     `${most > 0 ? `<br><span class="se">soil, dark to light: 0 to ${figure(most, 3)} W m⁻² arriving</span>` : ''}</p>`;
   if (!state.view) return;
-  const scale = top > 0 ? 1 / top : 0;
-  state.view.show(shownValues().map((value) => value * scale), soil.map((value) => (most > 0 ? value / most : 0)));
+  state.view.show(shownValues().map((value) => place(value, scale, how)), soil.map((value) => (most > 0 ? value / most : 0)));
 }
 
 function pick(organ) {
@@ -65,18 +67,17 @@ function showPicked() {
   }
   const per = (value) => (organ.area_m2 > 0 ? value / organ.area_m2 : 0);
   const rows = organ.light.map((light, band) => ({ name: report.bands[band], value: per(light.absorbed_W), se: per(light.se_W) }));
-  const cells = (title, each) => [title, ...organ.light.map(each)];
+  const line = (what, value, unit) => `<tr><td>${what}</td><td>${value} ${unit}</td></tr>`;
+  const lines = organ.light.map((light, band) => `<tr><th colspan="2">${html(report.bands[band])}</th></tr>` +
+    line('absorbed', withError(light.absorbed_W, light.se_W), 'W') +
+    line('straight from sources', figure(light.direct_W), 'W') +
+    line('on the upper face', figure(light.upper_W_m2), 'W m⁻²') +
+    line('on the lower face', figure(light.lower_W_m2), 'W m⁻²')).join('');
   const name = organName(organ);
   panel.innerHTML = `<h3>${html(name[0].toUpperCase() + name.slice(1))}</h3>` +
     `<p class="hint">${html(organ.kind)}, ${figure(organ.area_m2 * 1e4)} cm², one-sided</p>` +
-    `<p class="hint">Absorbed, per leaf area, ± one standard error</p>${errorBars(rows, 'W m⁻²')}` +
-    table(['', ...report.bands.map(html)], [
-      cells('absorbed, W m⁻²', (light) => withError(per(light.absorbed_W), per(light.se_W))),
-      cells('absorbed, W', (light) => withError(light.absorbed_W, light.se_W)),
-      cells('… straight from sources, W', (light) => figure(light.direct_W)),
-      cells('on the upper face, W m⁻²', (light) => figure(light.upper_W_m2)),
-      cells('on the lower face, W m⁻²', (light) => figure(light.lower_W_m2)),
-    ]) + '<p><button type="button" id="unpick">Choose another</button></p>';
+    `<p class="hint">Absorbed, W per m² of this organ, ± one standard error</p>${errorBars(rows)}` +
+    `<table>${lines}</table><p><button type="button" id="unpick">Choose another</button></p>`;
   element('unpick').addEventListener('click', () => pick(-1));
 }
 
@@ -85,25 +86,31 @@ function litArea(layer, band, threshold) {
   return layer.by_direct_m2[band].slice(threshold).reduce((a, b) => a + b, 0);
 }
 
+// What areas and powers are divided by, if the ground has an area: a wall that stands alone has none.
+const ground = report.ground_m[0] * report.ground_m[1];
+const groundName = report.periodic ? 'the pattern' : 'the box around the scene';
+const groundSize = report.ground_m.map((side) => `${figure(side, 3)} m`).join(' x ');
+
 function showProfiles() {
-  const { layers, ground_area_m2: ground, bands } = report;
+  const { layers, bands } = report;
   if (!layers.length) return;
+  const divisor = ground > 0 ? ground : 1;
+  const per = ground > 0 ? ' per m² of ground' : '';
   const from = Number(element('threshold').value);
-  const lit = layers.map((layer) => litArea(layer, state.band, from) / ground);
-  const shade = layers.map((layer, k) => layer.area_m2 / ground - lit[k]);
-  const name = html(bands[state.band]);
+  const lit = layers.map((layer) => litArea(layer, state.band, from) / divisor);
+  const shade = layers.map((layer, k) => layer.area_m2 / divisor - lit[k]);
   element('profiles').innerHTML = heightChart(`Leaf area: <span class="key lit">lit</span> and <span class="key shade">shaded</span>`,
-    'm² of leaf per m² of ground', layers, [{ look: 'lit', values: lit }, { look: 'shade', values: shade }]) +
-    bands.map((band, b) => heightChart(`Absorbed in ${html(band)}`, 'W per m² of ground', layers,
-      [{ look: 'bar', values: layers.map((layer) => layer.absorbed_W[b] / ground) }])).join('');
+    `m² of leaf${per}`, layers, [{ look: 'lit', values: lit }, { look: 'shade', values: shade }]) +
+    bands.map((band, b) => heightChart(`Absorbed in ${html(band)}`, `W${per}`, layers,
+      [{ look: 'bar', values: layers.map((layer) => layer.absorbed_W[b] / divisor) }])).join('');
   const area = layers.reduce((sum, layer) => sum + layer.area_m2, 0);
   element('profile-note').textContent = `In ${layers.length} layers of equal height (m, upwards); a triangle counts where its centre is. ` +
-    `Ground is ${report.periodic ? 'the pattern' : 'the box around the scene'}, ${figure(ground)} m². Lit and shaded are for ${bands[state.band]}.`;
-  element('threshold-value').textContent = `${(from * report.lit_step * 100).toFixed(1)} %`;
+    `${ground > 0 ? `Ground is ${groundName}, ${groundSize}. ` : ''}Lit and shaded are for ${bands[state.band]}.`;
+  element('threshold-value').textContent = `${fixed(from * report.lit_step * 100, 1)} %`;
   element('lit').innerHTML = table(['band', 'lit, m²', 'shaded, m²', 'lit', ''], bands.map((band, b) => {
     const own = layers.reduce((sum, layer) => sum + litArea(layer, b, from), 0);
     const part = area > 0 ? own / area : 0;
-    return [html(band), figure(own), figure(area - own), `${(part * 100).toFixed(1)} %`,
+    return [html(band), figure(own), figure(area - own), `${fixed(part * 100, 1)} %`,
       `<div class="share"><span class="lit" style="width:${part * 100}%"></span><span class="shade"></span></div>`];
   }));
 }
@@ -113,8 +120,8 @@ function showBalance() {
     ['absorbed by structures', 'absorbed_structures_W'], ['absorbed by the soil', 'absorbed_soil_W'],
     ['escaped upwards', 'escaped_up_W'], ['escaped downwards', 'escaped_down_W'], ['closure', 'closure_W']];
   // where the canopy repeats, per ground; a scene that stands alone, as a whole
-  const divisor = report.periodic ? report.ground_area_m2 : 1;
-  const part = (value, of) => (of > 0 ? ` <span class="se">(${(100 * value / of).toFixed(2)} %)</span>` : '');
+  const divisor = report.periodic ? ground : 1;
+  const part = (value, of) => (of > 0 ? ` <span class="se">(${fixed(100 * value / of, 2)} %)</span>` : '');
   const rows = [['incoming', ...report.balance.map((b) => figure(b.incoming_W / divisor, 5))]];
   // what is nothing in all bands is not worth a line; closure always is
   const matters = (key) => key === 'closure_W' || report.balance.some((b) => Math.abs(b[key].value) > 1e-6 * b.incoming_W);
@@ -139,8 +146,8 @@ function ofMaterials(divisor, part) {
 function showErrors() {
   element('errors').innerHTML = table(['band', 'standard error of an organ', 'closure in its own errors'], report.errors.map((error, k) => {
     const closure = report.balance[k].closure_W;
-    const rms = error.rms_percent === null ? '—' : `${error.rms_percent.toFixed(2)} %`;
-    return [html(error.band), rms, closure.se > 0 ? `${(Math.abs(closure.value) / closure.se).toFixed(1)}` : '—'];
+    const rms = error.rms_percent === null ? '—' : `${fixed(error.rms_percent, 2)} %`;
+    return [html(error.band), rms, closure.se > 0 ? fixed(Math.abs(closure.value) / closure.se, 1) : '—'];
   })) + `<p class="hint">Root mean square over all organs, in percent of the mean absorbed per leaf area; asked for: ${report.accuracy_percent} %. A triangle’s error is larger than its organ’s.</p>` + errorParts();
 }
 
@@ -151,13 +158,13 @@ function errorParts() {
   const shown = parts.filter(([, key]) => report.account.some((part) => part[key] >= 0.005));
   if (shown.length === 0) return '';
   return table(['what it comes from, %', ...shown.map(([name]) => name)],
-    report.account.map((part) => [html(part.band), ...shown.map(([, key]) => part[key].toFixed(2))])) +
+    report.account.map((part) => [html(part.band), ...shown.map(([, key]) => fixed(part[key], 2))])) +
     '<p class="hint">The standard error holds the sampling of exchange and direct light; the other parts come on top of it.</p>';
 }
 
 function showFacts() {
   const { plants, organs, triangles, sources, version, resources, seed } = report;
-  const index = report.area_index === null ? '' : ` · area index ${figure(report.area_index, 3)}`;
+  const index = report.area_index === null ? '' : ` · area index ${figure(report.area_index, 3)} (one-sided area of leaves and stems, per area of ${groundName}, ${groundSize})`;
   element('facts').textContent = `${plants} plants, ${organs.length} organs, ${triangles.toLocaleString('en')} triangles${index} · ${report.light} (${sources} sources)`;
   element('reasons').innerHTML = report.reasons.map((reason) => `<li>${html(reason)}</li>`).join('');
   element('cost').textContent = `nestrad ${version}, seed ${seed}; ${figure(resources.wall_s, 3)} s, ${figure(resources.cpu_s, 3)} s of processor time.`;
@@ -202,7 +209,21 @@ function selftest(wanted) {
       break;
     }
   }
-  return { pixels: canvas.width * canvas.height, drawn, colours: colours.size, gl_error: gl.getError(), picked: state.picked, panel: element('picked').innerText };
+  // what the picture says in each way of colouring: where on the ramp the darkest and the median triangle are
+  const ramps = {};
+  for (const by of ['triangle', 'organ']) {
+    state.by = by;
+    for (const how of ['log', 'linear', 'quantiles']) {
+      state.scaling = how;
+      recolour();
+      const places = Array.from(shownValues(), (value) => place(value, report.scales[state.band][by], how)).sort((a, b) => a - b);
+      ramps[`${by} ${how}`] = { places: [0.1, 0.25, 0.5, 0.75, 0.9].map((part) => places[Math.floor(part * places.length)]), ticks: element('scale').innerText };
+    }
+  }
+  const minus_zeros = document.body.innerText.match(/-0(\.0*)?(?![\d.])/g) || [];
+  const wide = document.documentElement.scrollWidth > document.documentElement.clientWidth;
+  const order = [...document.querySelectorAll('h2')].map((heading) => heading.textContent);
+  return { ramps, minus_zeros, wide, order, facts: element('facts').textContent, pixels: canvas.width * canvas.height, drawn, colours: colours.size, gl_error: gl.getError(), picked: state.picked, panel: element('picked').innerText };
 }
 
 try {
@@ -217,6 +238,7 @@ try {
 element('band').innerHTML = report.bands.map((band, k) => `<option value="${k}">${html(band)}</option>`).join('');
 element('band').addEventListener('change', (event) => { state.band = Number(event.target.value); recolour(); showProfiles(); });
 element('by').addEventListener('change', (event) => { state.by = event.target.value; recolour(); });
+element('scaling').addEventListener('change', (event) => { state.scaling = event.target.value; recolour(); });
 element('views').addEventListener('click', (event) => {
   if (!state.view || !event.target.dataset.view) return;
   state.view.camera.look(event.target.dataset.view);

@@ -11,11 +11,12 @@ use crate::html;
 
 const PAGE: &str = include_str!("page.html");
 /// In the order in which they need one another.
-const SCRIPTS: [&str; 5] = [
+const SCRIPTS: [&str; 6] = [
     include_str!("matrix.js"),
     include_str!("shaders.js"),
     include_str!("view.js"),
     include_str!("charts.js"),
+    include_str!("scale.js"),
     include_str!("page.js"),
 ];
 

@@ -1,12 +1,14 @@
 //! The canopy as a picture for print: seen from aside without perspective, as the page shows it first.
+//!
+//! Text is in GNU Unifont, which has the letters of all living scripts, so that any band can be named.
 
-use std::io::Write;
+use std::io::{self, Write};
 
-use flate2::write::ZlibEncoder;
-use flate2::{Compression, Crc};
 use glam::{DVec2, DVec3};
+use nestrad_common::figures::fixed;
+use unifont::{Glyph, get_glyph};
 
-use super::letters::letter;
+use super::scale::Scale;
 use crate::error::Fault;
 
 /// Viridis in nine steps, as on the page.
@@ -30,7 +32,10 @@ const FINER: usize = 2;
 const MARGIN: f64 = 40.0;
 const AZIMUTH: f64 = -0.9;
 const TILT: f64 = 0.45;
-const LETTER_DOT: usize = 4;
+/// Picture points along a dot of a letter; letters are 16 dots high, and 8 or 16 wide.
+const DOT: usize = 3;
+/// Ticks of the colour bar.
+const TICKS: usize = 5;
 
 /// A picture of red, green and blue.
 #[derive(Debug)]
@@ -38,18 +43,18 @@ pub(crate) struct Picture {
     points: Vec<[u8; 3]>,
 }
 
-/// Draws triangles, each with a value of 0 to 1, over a colour bar that goes to `top` and is for `what`.
+/// Draws triangles, each with a value of 0 to 1, over the colour bar of a scale in a band.
 pub(crate) fn draw(
     triangles: impl Iterator<Item = [DVec3; 3]> + Clone,
     value: impl Fn(usize) -> f64,
-    top: f64,
-    what: &str,
+    scale: &Scale,
+    band: &str,
 ) -> Picture {
     let mut picture = Picture {
         points: vec![[255; 3]; WIDTH * HEIGHT],
     };
     picture.canopy(triangles, value);
-    picture.bar(top, what);
+    picture.bar(scale, band);
     picture
 }
 
@@ -108,77 +113,112 @@ impl Picture {
         }
     }
 
-    fn bar(&mut self, top: f64, what: &str) {
-        let (left, length, upper, thick) = (200, WIDTH - 400, DRAWN_HEIGHT + 20, 40);
+    fn bar(&mut self, scale: &Scale, band: &str) {
+        let (left, length, upper, thick) = (200, WIDTH - 400, DRAWN_HEIGHT + 4, 30);
         for x in 0..length {
             let own = colour(x as f64 / (length - 1) as f64);
             for y in upper..upper + thick {
                 self.points[y * WIDTH + left + x] = own;
             }
         }
-        let line = upper + thick + 12;
-        self.write("0", left, line);
-        // three digits that mean something
-        let decimals = (2.0 - top.max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
-        self.write(&format!("{top:.decimals$}"), left + length, line);
-        self.write(&format!("{what} W m-2"), left + length / 2, line);
+        for tick in 0..TICKS {
+            let part = tick as f64 / (TICKS - 1) as f64;
+            let sign = match tick {
+                0 => "≤ ",
+                t if t == TICKS - 1 => "≥ ",
+                _ => "",
+            };
+            let text = format!("{sign}{}", three_digits(scale.value(part)));
+            let at = left + (length as f64 * part) as usize;
+            self.write(&text, at, upper + thick + 4);
+        }
+        let unit = " absorbed, W per m² of leaf";
+        let room = WIDTH / (8 * DOT) - unit.chars().count() - 2;
+        let text = cut(band, room) + unit;
+        self.write(&text, left + length / 2, HEIGHT - 16 * DOT - 8);
     }
 
     /// Text around a place.
     fn write(&mut self, text: &str, middle: usize, upper: usize) {
-        let step = 6 * LETTER_DOT;
-        // a long name is cut, not drawn over the edge
-        let text: Vec<char> = text.chars().take(40).collect();
-        let left = middle.saturating_sub(text.len() * step / 2);
-        for (k, &character) in text.iter().enumerate() {
-            for (column, dots) in letter(character).into_iter().enumerate() {
-                for row in (0..7).filter(|row| dots >> row & 1 == 1) {
-                    self.dot(
-                        left + k * step + column * LETTER_DOT,
-                        upper + row * LETTER_DOT,
-                    );
+        let mut left = middle.saturating_sub(width(text) * DOT / 2);
+        for character in text.chars() {
+            // a mark above or below a letter is drawn over it
+            let from = if is_mark(character) {
+                left.saturating_sub(8 * DOT)
+            } else {
+                left
+            };
+            let Some(glyph) = glyph(character) else {
+                continue;
+            };
+            for (x, y) in (0..glyph.get_width()).flat_map(|x| (0..16).map(move |y| (x, y))) {
+                if glyph.get_pixel(x, y) {
+                    self.dot(from + x * DOT, upper + y * DOT);
                 }
+            }
+            if !is_mark(character) {
+                left += glyph.get_width() * DOT;
             }
         }
     }
 
     fn dot(&mut self, left: usize, upper: usize) {
-        for y in upper..(upper + LETTER_DOT).min(HEIGHT) {
-            for x in left..(left + LETTER_DOT).min(WIDTH) {
+        for y in upper..(upper + DOT).min(HEIGHT) {
+            for x in left..(left + DOT).min(WIDTH) {
                 self.points[y * WIDTH + x] = [0; 3];
             }
         }
     }
 
-    /// Writes the picture as PNG: a head, one stream of rows, an end.
+    /// Writes the picture as PNG.
     pub(crate) fn write_png(&self, out: &mut impl Write) -> Result<(), Fault> {
-        out.write_all(b"\x89PNG\r\n\x1a\n")?;
-        let mut head = Vec::new();
-        for size in [WIDTH, HEIGHT] {
-            head.extend((size as u32).to_be_bytes());
-        }
-        // eight bits of red, green and blue; the only ways of compressing and filtering; row after row
-        head.extend([8, 2, 0, 0, 0]);
-        chunk(*b"IHDR", &head, out)?;
-        let mut rows = ZlibEncoder::new(Vec::new(), Compression::default());
-        for row in self.points.chunks(WIDTH) {
-            // rows as they are
-            rows.write_all(&[0])?;
-            rows.write_all(row.as_flattened())?;
-        }
-        chunk(*b"IDAT", &rows.finish()?, out)?;
-        chunk(*b"IEND", &[], out)
+        let mut encoder = png::Encoder::new(out, WIDTH as u32, HEIGHT as u32);
+        encoder.set_color(png::ColorType::Rgb);
+        encoder.set_depth(png::BitDepth::Eight);
+        let write = || {
+            let mut writer = encoder.write_header()?;
+            writer.write_image_data(self.points.as_flattened())?;
+            writer.finish()
+        };
+        Ok(write().map_err(io::Error::from)?)
     }
 }
 
-fn chunk(name: [u8; 4], data: &[u8], out: &mut impl Write) -> Result<(), Fault> {
-    let mut check = Crc::new();
-    check.update(&name);
-    check.update(data);
-    out.write_all(&(data.len() as u32).to_be_bytes())?;
-    out.write_all(&name)?;
-    out.write_all(data)?;
-    Ok(out.write_all(&check.sum().to_be_bytes())?)
+/// Three digits that mean something.
+fn three_digits(value: f64) -> String {
+    let decimals = (2.0 - value.max(1e-9).log10().floor()).clamp(0.0, 9.0) as usize;
+    fixed(value, if value > 0.0 { decimals } else { 0 })
+}
+
+/// What the font has for a character, or for one that it does not have.
+fn glyph(character: char) -> Option<&'static Glyph> {
+    get_glyph(character).or_else(|| get_glyph(char::REPLACEMENT_CHARACTER))
+}
+
+/// Width of a text, dots.
+fn width(text: &str) -> usize {
+    let shown = text.chars().filter(|&character| !is_mark(character));
+    shown.filter_map(glyph).map(Glyph::get_width).sum()
+}
+
+fn is_mark(character: char) -> bool {
+    matches!(character, '\u{300}'..='\u{36f}')
+}
+
+/// A name in so many columns of eight dots at most: a long one is cut, not drawn over the edge.
+fn cut(name: &str, columns: usize) -> String {
+    if width(name) <= 8 * columns {
+        return name.to_owned();
+    }
+    let mut short = String::new();
+    for character in name.chars() {
+        short.push(character);
+        if width(&short) > 8 * (columns - 2) {
+            short.pop();
+            break;
+        }
+    }
+    short + "…"
 }
 
 /// Calls `each` for the points that a triangle covers, with their depth.
@@ -228,6 +268,36 @@ fn shaded(colour: [u8; 3], facing: f64) -> [u8; 3] {
 mod tests {
     use super::*;
 
+    fn scale() -> Scale {
+        Scale::of([(0.5, 1.0), (300.0, 1.0)].into_iter())
+    }
+
+    /// The dots of the lowest line, which names the band.
+    fn name_line(band: &str) -> Vec<[u8; 3]> {
+        let picture = draw([].into_iter(), |_| 0.0, &scale(), band);
+        picture.points[(HEIGHT - 64) * WIDTH..].to_vec()
+    }
+
+    #[test]
+    fn names_beyond_ascii_were_blank() {
+        let blank = name_line("");
+        let replaced = name_line("\u{fffd}");
+        for name in ["ü", "µ", "λ", "Ж", "光", "א", "ก", "€", "(", "+", "é"] {
+            let line = name_line(name);
+            assert!(line != blank && line != replaced, "{name}");
+        }
+        assert!(name_line("a") != name_line("A"));
+        assert!(name_line("e\u{301}") != name_line("e"));
+        // what no font has is not passed over
+        assert!(name_line("\u{10ffff}") == replaced);
+        // and a name that is too long is cut within the picture
+        for long in ["near infrared ".repeat(20), "光".repeat(200)] {
+            let line = name_line(&long);
+            let edge = |x: usize| line.iter().skip(x).step_by(WIDTH).all(|&p| p == [255; 3]);
+            assert!(edge(0) && edge(WIDTH - 1) && line != blank);
+        }
+    }
+
     #[test]
     fn the_nearer_triangle_is_seen() {
         let [right, up, eye] = axes();
@@ -237,7 +307,7 @@ mod tests {
         for triangles in [[at(0.0), at(1.0)], [at(1.0), at(0.0)]] {
             let nearer = usize::from(triangles[0] == at(0.0));
             let value = |t: usize| if t == nearer { 1.0 } else { 0.0 };
-            let picture = draw(triangles.into_iter(), value, 1.0, "PAR");
+            let picture = draw(triangles.into_iter(), value, &scale(), "PAR");
             let middle = picture.points[DRAWN_HEIGHT / 2 * WIDTH + WIDTH / 2];
             assert_eq!(middle, COLOURS[8]);
             assert_eq!(picture.points[0], [255; 3]);
@@ -255,15 +325,15 @@ mod tests {
     }
 
     #[test]
-    fn a_picture_is_a_png() {
-        let mut out = Vec::new();
-        let picture = draw(
-            [].into_iter(),
-            |_| 0.0,
-            1.0,
-            "a name that is far too long for the picture it is on",
-        );
-        picture.write_png(&mut out).expect("written");
-        assert!(out.starts_with(b"\x89PNG"));
+    fn a_picture_reads_back_from_its_png() {
+        let mut bytes = Vec::new();
+        let picture = draw([].into_iter(), |_| 0.0, &scale(), "PAR");
+        picture.write_png(&mut bytes).expect("written");
+        let decoder = png::Decoder::new(io::Cursor::new(bytes));
+        let mut reader = decoder.read_info().expect("a head");
+        let mut points = vec![0; reader.output_buffer_size().expect("a size")];
+        let info = reader.next_frame(&mut points).expect("a picture");
+        assert_eq!((info.width, info.height), (WIDTH as u32, HEIGHT as u32));
+        assert!(points == picture.points.as_flattened());
     }
 }

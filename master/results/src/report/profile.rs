@@ -101,21 +101,6 @@ fn class(direct_W_m2: f64, above_W_m2: f64) -> usize {
     }
 }
 
-/// The value that all but `part` of the area stays below: the top of a colour scale that a few noisy
-/// triangles do not spoil.
-pub fn scale_top(values: impl Iterator<Item = (f64, f64)>, part: f64) -> f64 {
-    let mut values: Vec<(f64, f64)> = values.filter(|&(_, area)| area > 0.0).collect();
-    values.sort_by(|a, b| b.0.total_cmp(&a.0));
-    let mut left = part * values.iter().map(|&(_, area)| area).sum::<f64>();
-    for (value, area) in values {
-        left -= area;
-        if left < 0.0 {
-            return value;
-        }
-    }
-    0.0
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -166,13 +151,5 @@ mod tests {
         assert_eq!(layers[0].by_direct_m2[0][LIT_CLASSES - 1], 2.0);
         assert_eq!(layers[0].by_direct_m2[0][0], 1.0);
         assert!(super::layers(&[], &[1.0], 4).is_empty());
-    }
-
-    #[test]
-    fn the_scale_leaves_out_the_brightest_part() {
-        let values = [(1.0, 98.0), (5.0, 1.0), (900.0, 1.0), (9e9, 0.0)];
-        assert_eq!(scale_top(values.into_iter(), 0.015), 5.0);
-        assert_eq!(scale_top(values.into_iter(), 0.0), 900.0);
-        assert_eq!(scale_top([].into_iter(), 0.01), 0.0);
     }
 }

@@ -1,63 +1,160 @@
-//! CSV tables as `nestrad solve` writes them, read back row by row.
+//! Tables as `nestrad solve` writes them, CSV or Parquet, read back row by row. Columns are found by their
+//! names: those that nobody asks for may stand anywhere.
 
 use std::borrow::Cow;
-use std::fs;
+use std::fs::{self, File};
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
-use super::error::ReportError;
+use parquet::errors::ParquetError;
+use parquet::file::reader::{FileReader, SerializedFileReader};
+use parquet::record::Field;
+use parquet::schema::types::Type;
 
-/// A table in memory.
+use super::error::ReportError;
+use super::record::record;
+
+/// A table that is there.
 #[derive(Debug)]
 pub(crate) struct Table {
     path: PathBuf,
-    text: String,
+    /// In their order in the file.
+    columns: Vec<String>,
+    content: Content,
 }
 
-/// A row, of which cells are asked for by number.
+enum Content {
+    /// Without the header.
+    Csv(String),
+    Parquet(SerializedFileReader<File>),
+}
+
+/// A row, of which cells are asked for by the place of their column in the list that was asked for.
 #[derive(Debug)]
 pub(crate) struct Row<'a> {
     path: &'a Path,
     /// Counted from 1, the header being 1.
     number: usize,
-    cells: Vec<Cow<'a, str>>,
+    cells: Vec<Cell<'a>>,
     columns: &'a [&'a str],
 }
 
+#[derive(Clone, Debug)]
+enum Cell<'a> {
+    Text(Cow<'a, str>),
+    Real(f64),
+    Index(i64),
+}
+
 impl Table {
-    pub(crate) fn read(path: PathBuf) -> Result<Self, ReportError> {
+    /// Opens `NAME.csv` or `NAME.parquet`, whichever the folder has; `None` where it has neither.
+    pub(crate) fn find(folder: &Path, name: &str) -> Result<Option<Self>, ReportError> {
+        for (ending, open) in [
+            ("csv", Self::open_csv as fn(PathBuf) -> _),
+            ("parquet", Self::open_parquet),
+        ] {
+            let path = folder.join(name).with_extension(ending);
+            if path.exists() {
+                return open(path).map(Some);
+            }
+        }
+        Ok(None)
+    }
+
+    /// As [`Table::find`]; a table that is not there is an error.
+    pub(crate) fn open(folder: &Path, name: &str) -> Result<Self, ReportError> {
+        let missing = || ReportError::NoTable {
+            folder: folder.to_owned(),
+            name: name.to_owned(),
+        };
+        Self::find(folder, name)?.ok_or_else(missing)
+    }
+
+    fn open_csv(path: PathBuf) -> Result<Self, ReportError> {
         match fs::read_to_string(&path) {
-            Ok(text) => Ok(Self { path, text }),
+            Ok(text) => Ok(Self::of_csv(path, &text)),
             Err(source) => Err(ReportError::Read { path, source }),
         }
     }
 
-    /// Calls `each` for all rows but the header, which must begin with `columns`.
+    fn of_csv(path: PathBuf, text: &str) -> Self {
+        let (mut rest, mut header) = (text, Vec::new());
+        record(&mut rest, &mut header);
+        Self {
+            path,
+            columns: header.into_iter().map(Cow::into_owned).collect(),
+            content: Content::Csv(rest.to_owned()),
+        }
+    }
+
+    fn open_parquet(path: PathBuf) -> Result<Self, ReportError> {
+        let file = match File::open(&path) {
+            Ok(file) => file,
+            Err(source) => return Err(ReportError::Read { path, source }),
+        };
+        let reader = match guarded(|| SerializedFileReader::new(file)) {
+            Ok(reader) => reader,
+            Err(source) => return Err(ReportError::Parquet { path, source }),
+        };
+        let schema = reader.metadata().file_metadata().schema();
+        let names = schema.get_fields().iter().map(|f| f.name().to_owned());
+        Ok(Self {
+            path,
+            columns: names.collect(),
+            content: Content::Parquet(reader),
+        })
+    }
+
+    /// Calls `each` for all rows, with the cells of these columns.
     pub(crate) fn rows(
         &self,
         columns: &[&str],
         mut each: impl FnMut(&Row<'_>) -> Result<(), ReportError>,
     ) -> Result<(), ReportError> {
-        let mut rest = self.text.as_str();
+        let place = |name: &&str| self.columns.iter().position(|own| own == name);
+        let places: Option<Vec<usize>> = columns.iter().map(place).collect();
         let mut row = Row {
             path: &self.path,
             number: 1,
             cells: Vec::new(),
             columns,
         };
-        record(&mut rest, &mut row.cells);
-        if row.cells.len() < columns.len() || row.cells.iter().zip(columns).any(|(a, b)| a != b) {
-            return Err(row.not(&columns.join(","), &row.cells.join(",")));
-        }
-        while !rest.is_empty() {
-            row.number += 1;
-            record(&mut rest, &mut row.cells);
-            if row.cells.len() < columns.len() {
-                let cells = row.cells.len().to_string();
-                return Err(row.not(&format!("{} cells", columns.len()), &cells));
+        let Some(places) = places else {
+            let wanted = format!("the columns {}", columns.join(","));
+            return Err(row.not(&wanted, &self.columns.join(",")));
+        };
+        match &self.content {
+            Content::Csv(text) => {
+                let (mut rest, mut cells) = (text.as_str(), Vec::new());
+                while !rest.is_empty() {
+                    row.number += 1;
+                    record(&mut rest, &mut cells);
+                    if cells.len() != self.columns.len() {
+                        let wanted = format!("{} cells", self.columns.len());
+                        return Err(row.not(&wanted, &cells.len().to_string()));
+                    }
+                    row.cells.clear();
+                    let texts = places.iter().map(|&place| cells[place].clone());
+                    row.cells.extend(texts.map(Cell::Text));
+                    each(&row)?;
+                }
             }
-            each(&row)?;
+            Content::Parquet(reader) => {
+                let broken = |error| self.not_parquet(error);
+                let mut rows = guarded(|| parquet_rows(reader, columns)).map_err(broken)?;
+                while let Some(cells) = guarded(|| rows.next().transpose()).map_err(broken)? {
+                    row.number += 1;
+                    row.cells = cells;
+                    each(&row)?;
+                }
+            }
         }
         Ok(())
+    }
+
+    fn not_parquet(&self, source: ParquetError) -> ReportError {
+        let path = self.path.clone();
+        ReportError::Parquet { path, source }
     }
 
     /// The error of a table that does not have a row for all that there are.
@@ -71,22 +168,72 @@ impl Table {
     }
 }
 
+/// Reads of a Parquet file, which may be damaged: the library has checks that panic.
+fn guarded<T>(read: impl FnOnce() -> Result<T, ParquetError>) -> Result<T, ParquetError> {
+    catch_unwind(AssertUnwindSafe(read))
+        .unwrap_or_else(|_| Err(ParquetError::General("the file is damaged".to_owned())))
+}
+
+/// The cells of these columns, which the file has, row by row.
+fn parquet_rows<'a>(
+    reader: &'a SerializedFileReader<File>,
+    columns: &'a [&'a str],
+) -> Result<impl Iterator<Item = Result<Vec<Cell<'a>>, ParquetError>>, ParquetError> {
+    let schema = reader.metadata().file_metadata().schema();
+    let wanted = schema.get_fields().iter();
+    let wanted: Vec<_> = wanted
+        .filter(|field| columns.contains(&field.name()))
+        .cloned()
+        .collect();
+    let place = |name: &&str| wanted.iter().position(|field| field.name() == *name);
+    let places: Vec<usize> = columns.iter().filter_map(place).collect();
+    let projection = Type::group_type_builder(schema.name())
+        .with_fields(wanted)
+        .build()?;
+    let rows = reader.get_row_iter(Some(projection))?;
+    Ok(rows.map(move |row| {
+        let fields: Vec<Field> = row?.into_columns().into_iter().map(|(_, f)| f).collect();
+        Ok(places.iter().map(|&place| cell(&fields[place])).collect())
+    }))
+}
+
+fn cell(field: &Field) -> Cell<'static> {
+    match field {
+        Field::Str(text) => Cell::Text(text.clone().into()),
+        Field::Double(value) => Cell::Real(*value),
+        Field::Long(value) => Cell::Index(*value),
+        other => Cell::Text(other.to_string().into()),
+    }
+}
+
 impl Row<'_> {
-    pub(crate) fn text(&self, column: usize) -> &str {
-        &self.cells[column]
+    pub(crate) fn text(&self, column: usize) -> Cow<'_, str> {
+        match &self.cells[column] {
+            Cell::Text(text) => Cow::Borrowed(text),
+            Cell::Real(value) => value.to_string().into(),
+            Cell::Index(value) => value.to_string().into(),
+        }
     }
 
     pub(crate) fn real(&self, column: usize) -> Result<f64, ReportError> {
-        let text = self.text(column);
-        let value = text.parse().ok().filter(|value: &f64| value.is_finite());
+        let value = match &self.cells[column] {
+            Cell::Text(text) => text.parse().ok(),
+            Cell::Real(value) => Some(*value),
+            Cell::Index(_) => None,
+        };
+        let value = value.filter(|value: &f64| value.is_finite());
         let name = self.columns[column];
-        value.ok_or_else(|| self.not(&format!("a number for {name}"), text))
+        value.ok_or_else(|| self.not(&format!("a number for {name}"), &self.text(column)))
     }
 
     pub(crate) fn index(&self, column: usize) -> Result<usize, ReportError> {
-        let (text, name) = (self.text(column), self.columns[column]);
-        let value = text.parse().ok();
-        value.ok_or_else(|| self.not(&format!("a whole number for {name}"), text))
+        let value = match &self.cells[column] {
+            Cell::Text(text) => text.parse().ok(),
+            Cell::Real(_) => None,
+            Cell::Index(value) => usize::try_from(*value).ok(),
+        };
+        let name = self.columns[column];
+        value.ok_or_else(|| self.not(&format!("a whole number for {name}"), &self.text(column)))
     }
 
     /// Refuses the row unless a cell is what is expected.
@@ -95,7 +242,7 @@ impl Row<'_> {
             return Ok(());
         }
         let what = format!("{} {expected}", self.columns[column]);
-        Err(self.not(&what, self.text(column)))
+        Err(self.not(&what, &self.text(column)))
     }
 
     /// The error of a row that is not what it should be.
@@ -109,59 +256,22 @@ impl Row<'_> {
     }
 }
 
-/// Takes one record off the text: RFC 4180, as [`crate::csv`] writes it.
-fn record<'a>(rest: &mut &'a str, cells: &mut Vec<Cow<'a, str>>) {
-    cells.clear();
-    loop {
-        let (cell, after) = match rest.strip_prefix('"') {
-            Some(quoted) => in_quotes(quoted),
-            None => {
-                let end = rest.find([',', '\n']).unwrap_or(rest.len());
-                (rest[..end].trim_end_matches('\r').into(), &rest[end..])
-            }
-        };
-        cells.push(cell);
-        let more = after.starts_with(',');
-        *rest = after.get(1..).unwrap_or("");
-        if !more {
-            return;
-        }
-    }
-}
-
-/// The text up to the closing quote, and what comes after it.
-fn in_quotes(text: &str) -> (Cow<'_, str>, &str) {
-    let mut from = 0;
-    loop {
-        let Some(at) = text[from..].find('"').map(|at| from + at) else {
-            return (text.replace("\"\"", "\"").into(), "");
-        };
-        if !text[at + 1..].starts_with('"') {
-            let after = text[at + 1..].trim_start_matches('\r');
-            return (text[..at].replace("\"\"", "\"").into(), after);
-        }
-        from = at + 2;
+impl std::fmt::Debug for Content {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Csv(_) => "Csv",
+            Self::Parquet(_) => "Parquet",
+        })
     }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::table::{self, Column};
 
     fn table(text: &str) -> Table {
-        Table {
-            path: "t.csv".into(),
-            text: text.to_owned(),
-        }
-    }
-
-    #[test]
-    fn quoted_names_come_back() {
-        let mut rest = "plain,\"a,b\",\"say \"\"so\"\"\",\"two\nlines\",,é\nnext";
-        let mut cells = Vec::new();
-        record(&mut rest, &mut cells);
-        assert_eq!(cells, ["plain", "a,b", "say \"so\"", "two\nlines", "", "é"]);
-        assert_eq!(rest, "next");
+        Table::of_csv("t.csv".into(), text)
     }
 
     #[test]
@@ -185,5 +295,91 @@ mod tests {
         assert!(error.is_err());
         let error = table("band,x\nPAR\n").rows(&["band", "x"], |_| Ok(()));
         assert!(error.is_err());
+    }
+
+    #[test]
+    fn columns_are_found_in_any_order() {
+        let mut rows = Vec::new();
+        table("new,x,band\n7,1.5,PAR\n")
+            .rows(&["band", "x"], |row| {
+                rows.push((row.text(0).into_owned(), row.real(1)?));
+                Ok(())
+            })
+            .expect("read");
+        assert_eq!(rows, [("PAR".to_owned(), 1.5)]);
+    }
+
+    #[test]
+    fn a_damaged_parquet_file_is_an_error_or_other_values() {
+        let written = table::Table {
+            name: "t",
+            rows: 20,
+            columns: vec![
+                Column::index("triangle", |row| row / 2),
+                Column::text("band", |row| ["PAR", "NIR"][row % 2]),
+                Column::quantity("x", |row| row as f64 / 3.0),
+            ],
+        };
+        let mut bytes = Vec::new();
+        crate::parquet::write(&written, &mut bytes).expect("written");
+        let folder = tempfile::tempdir().expect("a folder");
+        let mut refused = 0;
+        let mut read = |bytes: &[u8]| {
+            fs::write(folder.path().join("t.parquet"), bytes).expect("written");
+            let table = Table::open(folder.path(), "t");
+            let rows = table.and_then(|table| {
+                let each = |row: &Row<'_>| row.index(0).and(row.real(2)).map(drop);
+                table.rows(&["triangle", "band", "x"], each)
+            });
+            refused += usize::from(rows.is_err());
+        };
+        for at in 0..bytes.len() {
+            read(&bytes[..at]);
+            for change in [0x15, 0xff] {
+                let mut damaged = bytes.clone();
+                damaged[at] ^= change;
+                read(&damaged);
+            }
+        }
+        assert!(refused > bytes.len());
+    }
+
+    /// Every table that is written reads back alike from both formats.
+    #[test]
+    fn parquet_was_refused() {
+        let names = ["PAR", "a,\"b\""];
+        let written = table::Table {
+            name: "t",
+            rows: 5,
+            columns: vec![
+                Column::index("triangle", |row| row / 2),
+                Column::text("band", |row| names[row % 2]),
+                Column::quantity("x", |row| row as f64 / 3.0),
+            ],
+        };
+        let folder = tempfile::tempdir().expect("a folder");
+        let read = || {
+            let table = Table::open(folder.path(), "t").expect("there");
+            let mut rows = Vec::new();
+            let columns = ["x", "triangle", "band"];
+            let each = |row: &Row<'_>| {
+                let (x, triangle) = (row.real(0)?.to_bits(), row.index(1)?);
+                rows.push((x, triangle, row.text(2).into_owned()));
+                Ok(())
+            };
+            table.rows(&columns, each).expect("read");
+            rows
+        };
+        let path = folder.path().join("t.parquet");
+        let mut bytes = Vec::new();
+        crate::parquet::write(&written, &mut bytes).expect("written");
+        fs::write(&path, bytes).expect("written");
+        let of_parquet = read();
+        fs::remove_file(path).expect("removed");
+        let mut bytes = Vec::new();
+        crate::csv::write(&written, &mut bytes).expect("written");
+        fs::write(folder.path().join("t.csv"), bytes).expect("written");
+        assert_eq!(of_parquet.len(), 5);
+        assert_eq!(of_parquet, read());
     }
 }

@@ -2,6 +2,8 @@
 
 use std::io::{self, Write};
 
+use nestrad_common::figures::fixed;
+
 use super::choice::Missed;
 use super::measure::ErrorRange;
 use super::table::{Choice, Comparison, Measured};
@@ -93,7 +95,7 @@ pub(super) fn short(value: f64) -> String {
         v if v < 100.0 => 1,
         _ => 0,
     };
-    format!("{value:.decimals$}")
+    fixed(value, decimals)
 }
 
 #[cfg(test)]
