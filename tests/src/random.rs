@@ -10,7 +10,7 @@ use nestrad_common::formats::can;
 use nestrad_common::formats::pattern::Rectangle;
 use nestrad_common::light::{Light, Source};
 use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
-use nestrad_common::options::Unit;
+use nestrad_common::options::{Unit, Up};
 use nestrad_common::scene::Scene;
 use nestrad_engine::plan::Plan;
 
@@ -183,6 +183,7 @@ pub fn wild(seed: u64) -> Result<Scene, String> {
             .flatten(),
         soil: (dice.below(2) > 0).then(|| wild_number(&mut dice)),
         unit,
+        up: Up::Z,
     };
     let (canopy, origins) = build_canopy(geometry).map_err(|e| e.to_string())?;
     nestrad_common::inspection::inspect(&canopy, &origins);

@@ -10,7 +10,7 @@ use nestrad_common::formats::GeometryFile;
 use nestrad_common::formats::pattern::Rectangle;
 use nestrad_common::geometry::area;
 use nestrad_common::optics::LeafOptics;
-use nestrad_common::options::{Diameter, Unit};
+use nestrad_common::options::{Diameter, Unit, Up};
 use nestrad_common::scene::Scene;
 use nestrad_engine::frame::extent_of;
 use nestrad_engine::plan::{Plan, Settings};
@@ -249,6 +249,7 @@ proptest! {
                 pattern: from.pattern.and_then(|p| Rectangle::from_corners(corners(p))),
                 soil: from.soil_z_m.map(|z| z * per_metre),
                 unit,
+                up: Up::Z,
             };
             let (canopy, _) = build_canopy(geometry).map_err(|e| TestCaseError::fail(e.to_string()))?;
             Ok::<_, TestCaseError>(Scene { canopy: canopy.into(), ..from.scene() })
