@@ -209,7 +209,7 @@ pub fn wild(seed: u64, doubled: bool) -> Result<Scene, String> {
             .flatten(),
         soil: (dice.below(2) > 0).then(|| wild_number(&mut dice)),
         unit,
-        up: Up::default(),
+        up: Up::Z,
     };
     let (canopy, origins) = build_canopy(geometry).map_err(|e| e.to_string())?;
     nestrad_common::inspection::inspect(&canopy, &origins);

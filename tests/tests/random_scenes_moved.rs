@@ -253,7 +253,7 @@ proptest! {
                 pattern: from.pattern.and_then(|p| Rectangle::from_corners(corners(p))),
                 soil: from.soil_z_m.map(|z| z * per_metre),
                 unit,
-                up: Up::default(),
+                up: Up::Z,
             };
             let (canopy, _) = build_canopy(geometry).map_err(|e| TestCaseError::fail(e.to_string()))?;
             Ok::<_, TestCaseError>(Scene { canopy: canopy.into(), ..from.scene() })

@@ -7,7 +7,6 @@ use std::thread;
 
 use anyhow::{Context, Result};
 use clap::Parser;
-use clap::builder::RangedU64ValueParser;
 use nestrad_proto::channel::{Credentials, connect};
 use nestrad_worker::serving::{Offer, serve};
 use tokio::runtime::Builder;
@@ -27,8 +26,7 @@ pub(crate) struct Cli {
     master: String,
 
     /// Jobs to compute at a time, one a thread; 0 for one per processor
-    #[arg(long, value_name = "N", default_value_t = 0,
-          value_parser = RangedU64ValueParser::<u32>::new().range(0..=4096))]
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: u32,
 
     /// Memory that it may take, GiB [default: three quarters of what the machine has free]
@@ -143,6 +141,11 @@ fn free_memory_bytes() -> u64 {
     let allowed = allowed.and_then(|text| text.trim().parse::<u64>().ok());
     let least = available.map_or(4 << 30, |kib| kib << 10);
     allowed.map_or(least, |bytes| bytes.min(least))
+}
+
+fn threads(text: &str) -> Result<u32, String> {
+    let number = text.parse().ok().filter(|number| *number <= 4096);
+    number.ok_or_else(|| "expected a whole number from 0 to 4096".to_owned())
 }
 
 fn positive(text: &str) -> Result<f64, String> {

@@ -63,13 +63,16 @@ pub fn parse(file: &str, bytes: &[u8]) -> Result<GeometryFile, FormatError> {
 }
 
 /// Statements that say nothing of triangles. Not among them are `call` and `csh`, which bring in other files.
-const PASSED_OVER: [&[u8]; 29] = [
+const PASSED_OVER: [&[u8]; 31] = [
     // vertices of other kinds, lines and points
     b"vt",
     b"vn",
     b"vp",
     b"l",
     b"p",
+    // weights of bones, and tags of subdivision
+    b"vw",
+    b"t",
     // how faces look
     b"s",
     b"mg",

@@ -79,7 +79,7 @@ fn fault_a_comment_behind_a_name_was_part_of_it() {
 fn fault_statements_that_say_nothing_of_triangles_were_refused() {
     let plain = parsed("f 1 2 3").unwrap();
     let other = "usemap wood\nmg 1 0.5\nbevel on\nlod 3\nmaplib a.map\nshadow_obj a.obj\nvp 0.1 0.2\n\
-                 trace_obj a.obj\nc_interp on\nd_interp off\nl 1 2\np 1\nvt 0 0\nvn 0 0 1\ns off\n";
+                 trace_obj a.obj\nc_interp on\nd_interp off\nl 1 2\np 1\nvw 1 0.5\nt crease 1 2\nvt 0 0\nvn 0 0 1\ns off\n";
     assert_eq!(parsed(&format!("{other}f 1 2 3")).unwrap().mesh, plain.mesh);
     let curved = "cstype bspline\ndeg 3\ncurv 0.0 1.0 1 2 3 4\nparm u 0 0 0 \\\n 1 1 1\nend\n";
     let file = parsed(&format!("{curved}f 1 2 3")).unwrap();

@@ -22,6 +22,9 @@ const ROUNDED: f64 = 1e-3;
 /// polygon's plane into ours are rounded.
 const TOUCHING: f64 = 1e-9;
 
+/// Twice the area of a polygon that is too narrow to be refused, in parts of its width squared.
+const NEEDLE: f64 = 1e-4;
+
 /// Areas below this, in parts of the width squared, are made of rounding.
 const ROUNDING_AREA: f64 = 1e-13;
 
@@ -80,7 +83,7 @@ impl Cutter {
             if turned_back <= ROUNDING_AREA {
                 self.fan_of(polygon.len());
             } else if let Err(fault) = self.clip_ears() {
-                if turned_back > ROUNDED {
+                if turned_back > ROUNDED && !self.is_needle() {
                     return Err(if is_flat {
                         fault
                     } else {
@@ -124,6 +127,11 @@ impl Cutter {
         let farthest = most(|v, _| v.abs().max_element());
         let rounding = 4.0 * f64::EPSILON * (farthest / width).max(1.0);
         self.fan_crosses().any(|cross| cross.length() > rounding)
+    }
+
+    /// Whether the polygon is so narrow that rounding may have crossed its edges.
+    fn is_needle(&self) -> bool {
+        self.fan_crosses().map(DVec3::length).sum::<f64>() <= NEEDLE
     }
 
     /// Twice the area vectors of the triangles around the first vertex.

@@ -207,6 +207,8 @@ fn rounded_coordinates_are_no_fault() {
     let mut needle = raised(&needle);
     needle[2].z = 2e-6;
     assert_eq!(indices(&needle), [[0, 1, 2], [0, 2, 3]]);
+    let crossed = raised(&[[0.0, 0.0], [0.1, 0.0], [0.1, -1e-6], [0.0, 1e-6]]);
+    assert_eq!(indices(&crossed), [[0, 1, 2], [0, 2, 3]]);
 }
 
 #[test]

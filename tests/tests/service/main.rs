@@ -9,6 +9,7 @@
 mod access;
 mod clients;
 mod garbage;
+mod light;
 mod limits;
 mod many_solves;
 mod python;

@@ -112,6 +112,10 @@ fn light_that_cannot_be_is_refused() {
             "found inf",
         ),
         (
+            with(|_, s| s.irradiance_w_m2[0] = 1e101),
+            "sources[0].irradiance_W_m2[0]: expected 0 or 1e-100 to 1e100",
+        ),
+        (
             with(|_, s| s.direction_z = 4.0),
             "sources[0]: direction: expected",
         ),
