@@ -53,7 +53,7 @@ fn from_layers(frame: &Frame, optics: &Optics, sources: &[Source]) -> Vec<f64> {
 const INCLINATION_CLASSES: u32 = 18;
 
 /// Radiosities of the ends that are not rows, W m⁻², indexed `(end - rows) * bands + band`: dark, but for the soil
-/// beyond the map of an open scene, which sends out these (see [`outer_soil`](crate::outer_soil)), and the start of
+/// beyond the map of an open scene, which sends out these, and the start of
 /// the far field.
 pub fn fixed_radiosity_W_m2(
     frame: &Frame,

@@ -5,6 +5,7 @@ mod aims;
 mod counts;
 mod density;
 mod elements;
+mod finest;
 mod limits;
 mod memory;
 mod reasons;
@@ -30,6 +31,7 @@ use crate::lit_canopy::LitCanopy;
 use crate::solver::Tolerance;
 pub use aims::Aims;
 pub use counts::WorkCounts;
+pub use finest::AtFinest;
 pub use limits::LEAST_ACCURACY_PERCENT;
 pub use memory::Memory;
 pub use scale::Scale;
@@ -99,21 +101,6 @@ pub struct Plan {
     pub memory: Memory,
     /// One line each: what, and the reason.
     pub reasons: Vec<String>,
-}
-
-/// Which parts of a plan are as fine as they get.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct AtFinest {
-    /// Directions of the exchange.
-    pub exchange: bool,
-    /// Pitch of the direct light.
-    pub direct: bool,
-    /// Directions of a built-in sky.
-    pub sky: bool,
-    /// Size of elements.
-    pub elements: bool,
-    /// Size of soil cells.
-    pub soil: bool,
 }
 
 /// How a canopy is traced.
@@ -378,19 +365,6 @@ impl Plan {
             needed: self.memory,
             limit_GiB: memory_GiB,
         })
-    }
-
-    /// The parts that no plan makes finer.
-    pub fn at_finest(&self) -> AtFinest {
-        let (aims, ground_m2) = (&self.aims, self.scale.ground_area_m2);
-        AtFinest {
-            exchange: aims.exchange_percent <= LEAST_ACCURACY_PERCENT,
-            direct: aims.direct_percent <= LEAST_ACCURACY_PERCENT
-                || self.light.direct_line_area_m2 <= ground_m2 / MOST_DIRECT_LINES,
-            sky: aims.has_most_sky_directions(),
-            elements: aims.has_smallest_elements(),
-            soil: self.trace.soil_cell_m <= smallest_soil_cell_m(&self.scale),
-        }
     }
 
     /// Planning the exchange for a larger error than this makes it no coarser.
