@@ -137,6 +137,7 @@ pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
     facts.areas(canopy, origins, (upper - lower).truncate());
     facts.find_duplicates(canopy, origins);
     facts.find_below_soil(canopy, origins);
+    facts.find_inside_out(canopy, origins);
     let farthest = (lower + canopy.origin_m)
         .abs()
         .max((upper + canopy.origin_m).abs());
@@ -271,6 +272,18 @@ impl Inspection {
                 "partly or wholly below the soil plane",
                 origins,
                 first,
+            );
+        }
+    }
+
+    fn find_inside_out(&mut self, canopy: &Canopy, origins: &Origins) {
+        let inside_out = canopy.solids().inside_out;
+        if let Some(&first) = inside_out.first() {
+            self.warn(
+                inside_out.len(),
+                "of closed stems turned inside out (the upper face looks inwards)",
+                origins,
+                first as usize,
             );
         }
     }

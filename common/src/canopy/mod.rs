@@ -2,6 +2,7 @@
 
 mod kind;
 mod mesh;
+mod solids;
 mod weld;
 
 use std::collections::BTreeMap;
@@ -12,6 +13,7 @@ use glam::{DAffine3, DVec2, DVec3};
 use crate::geometry;
 pub use kind::Kind;
 pub use mesh::{Mesh, Triangle};
+pub use solids::Solids;
 pub use weld::Welder;
 
 /// A canopy ready to be computed: checked, in metres, moved to a local origin.
@@ -124,14 +126,19 @@ impl Canopy {
         self.materials.iter().map(kind).collect()
     }
 
-    /// Whether the lower faces of each material are the inside of something solid: of CAN's stems, unless they are
+    /// Whether the lower faces of each material may be the inside of something solid: of CAN's stems, unless they are
     /// declared to be a structure, which has two faces.
-    pub fn solid(&self) -> Vec<bool> {
+    pub fn may_be_solid(&self) -> Vec<bool> {
         let kinds = self.kinds().into_iter().zip(&self.materials);
         let solid = |(kind, material): (Kind, &Material)| {
             matches!(material, Material::Stem { .. }) && kind != Kind::Structure
         };
         kinds.map(solid).collect()
+    }
+
+    /// What is solid.
+    pub fn solids(&self) -> Solids {
+        Solids::of(self, &self.may_be_solid())
     }
 
     /// Whether each organ is of a plant: some of it is leaf or stem.

@@ -91,7 +91,7 @@ fn kinds_are_declared_for_materials_and_species() {
     let (stem, soil, built) = (Kind::Stem, Kind::Soil, Kind::Structure);
     assert_eq!(canopy.kinds(), [Kind::Leaf, built, stem, soil]);
     // a structure has two faces, a stem of OBJ is no solid
-    assert_eq!(canopy.solid(), [false; 4]);
+    assert_eq!(canopy.may_be_solid(), [false; 4]);
     assert_eq!(canopy.plants(), [true, false, true, true]);
     let organs = [Some(Kind::Leaf), Some(built), None, Some(stem)];
     assert_eq!(canopy.organ_kinds(), organs);

@@ -86,7 +86,8 @@ impl Frame {
         let materials: Vec<String> = canopy.materials.iter().map(Material::to_string).collect();
         let materials = order.by_material(&materials);
         let kinds = order.by_material(&canopy.kinds());
-        let solid = order.by_material(&canopy.solid());
+        let solid = canopy.solids().solid;
+        let solid: Vec<bool> = order.triangle.iter().map(|&t| solid[t as usize]).collect();
         let mut area_m2 = Vec::with_capacity(elements.len());
         for (triangle, &n) in soup.triangles().zip(&elements.divisions) {
             let pieces = n * n;
@@ -98,7 +99,7 @@ impl Frame {
             skipped_elements: 0,
             divisions: elements.divisions[t],
             owned: true,
-            solid: solid[material[t] as usize],
+            solid: solid[t],
         });
         let ends = world.ends();
         let whole = BlockFrame {
@@ -147,7 +148,7 @@ impl Frame {
     /// Whether the lower face of a triangle is the inside of something solid: what is buried there gets and gives
     /// no light.
     pub fn is_solid(&self, triangle: usize) -> bool {
-        self.solid[self.material[triangle] as usize]
+        self.solid[triangle]
     }
 
     /// What a triangle counts as.

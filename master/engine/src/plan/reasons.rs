@@ -110,10 +110,11 @@ fn field(canopy: &Canopy, settings: &Settings, plan: &Plan) -> String {
 }
 
 fn faces(canopy: &Canopy) -> String {
-    let of_material = canopy.solid();
-    let triangles = canopy.triangles();
-    let solid = triangles
-        .filter(|t| of_material[t.material as usize])
+    let solid = canopy
+        .solids()
+        .solid
+        .into_iter()
+        .filter(|&solid| solid)
         .count();
     format!(
         "faces: two for each of {} triangles; {solid} of them enclose something solid, where leaves that stick in it are dark",

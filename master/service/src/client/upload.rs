@@ -89,7 +89,7 @@ fn sky(light: &SkyLight) -> v1::SkyLight {
 
 /// The canopy stands at its local origin already: the master leaves it there, bit for bit.
 fn geometry(canopy: &Canopy) -> v1::GeometryHeader {
-    let kinds = canopy.kinds().into_iter().zip(canopy.solid());
+    let kinds = canopy.kinds().into_iter().zip(canopy.may_be_solid());
     let materials = canopy.materials.iter().zip(kinds).enumerate();
     let materials = materials.map(|(number, (material, (kind, solid)))| v1::SceneMaterial {
         // numbered, so that no two are the same

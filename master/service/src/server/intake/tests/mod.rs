@@ -175,7 +175,7 @@ fn kinds_and_species_arrive() {
     ];
     assert_eq!(canopy.kinds(), kinds);
     let solid = [false, true, false, false, false, false, true];
-    assert_eq!(canopy.solid(), solid);
+    assert_eq!(canopy.may_be_solid(), solid);
     let opaque = Surface::of(canopy)
         .iter()
         .map(Surface::is_opaque)
