@@ -101,7 +101,7 @@ fn inspected(inputs: &Inputs) -> Result<(Canopy, Origins, Inspection), LoadError
     let geometry = read_geometry(inputs)?;
     let of_files = geometry.files.iter();
     let warnings: Vec<String> = of_files.flat_map(|file| file.warnings.clone()).collect();
-    let (canopy, origins) = build_canopy(geometry)?;
+    let (canopy, origins) = canopy_of(geometry, inputs)?;
     let mut inspection = inspect(&canopy, &origins);
     inspection.warnings.splice(0..0, warnings);
     inspection.warnings.extend(kinds::unknown(inputs, &canopy));
@@ -110,11 +110,12 @@ fn inspected(inputs: &Inputs) -> Result<(Canopy, Origins, Inspection), LoadError
 
 /// Reads the canopy alone, in metres: where it stands is all that a drawing of results needs.
 pub fn load_canopy(inputs: &Inputs) -> Result<Canopy, LoadError> {
-    Ok(read_canopy(inputs)?.0)
+    Ok(canopy_of(read_geometry(inputs)?, inputs)?.0)
 }
 
-fn read_canopy(inputs: &Inputs) -> Result<(Canopy, Origins), LoadError> {
-    let (mut canopy, origins) = build_canopy(read_geometry(inputs)?)?;
+/// The canopy of a geometry, with the kinds that inputs declare.
+fn canopy_of(geometry: Geometry, inputs: &Inputs) -> Result<(Canopy, Origins), LoadError> {
+    let (mut canopy, origins) = build_canopy(geometry)?;
     canopy.declared = kinds::declared(inputs, &canopy);
     Ok((canopy, origins))
 }

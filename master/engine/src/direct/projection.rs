@@ -158,8 +158,9 @@ impl<'a> Under<'a> {
         (end < self.frame.rows()).then_some(end)
     }
 
-    /// The cells that are lit. A cell that the lattice meets often is lit by the part of its points that see the
-    /// source, so a cell in full light has just that; the others by the area of the points that show them.
+    /// The cells that are lit. Cells that span some steps of the lattice on both sides are lit by the part of their
+    /// points that see the source, so a cell in full light has just that; smaller ones by the area of the points that
+    /// show them.
     fn lit_cells(&self, lattice: &Lattice, visible: &[u32]) -> Vec<LitCell> {
         let Some(soil) = &self.frame.world.soil else {
             return Vec::new();
@@ -172,12 +173,15 @@ impl<'a> Under<'a> {
             points
         };
         let (across, along) = (points_along(0, &self.column), points_along(1, &self.row));
+        let corner = soil.min_m.extend(soil.z_m);
+        let steps = lattice.place(corner + soil.cell_m.extend(0.0)) - lattice.place(corner);
+        let is_large = steps.min_element() >= LARGE.sqrt();
         let of_point = lattice.line_area_m2 / (lattice.direction.z * soil.cell_area_m2());
         let cells = (0..self.frame.ends.soil_cells).map(|cell| {
             let [column, row] = [cell % soil.cells[0], cell / soil.cells[0]];
             let met = f64::from(across[column as usize] * along[row as usize]);
             let seen = f64::from(visible[self.frame.ends.soil(cell) as usize]);
-            let (part, variance) = if LARGE * of_point < 1.0 && met > 0.0 {
+            let (part, variance) = if is_large && met > 0.0 {
                 let part = seen / met;
                 // binomial, for the points that meet it
                 (part, part * (1.0 - part) / met)
