@@ -33,19 +33,27 @@ pub(super) struct Outline {
 
 /// Variance of a sum over points, each of them worth what its face is, in parts of that of a point.
 pub(super) fn variance(outlines: &[Outline], worth: impl Fn(Face) -> f64) -> f64 {
-    let mut crossings = 0.0;
-    let mut roughness = [Roughness::default(); 2];
-    for outline in outlines {
-        let [a, b] = outline.faces.map(&worth);
-        let itself = outline.faces[0] == outline.faces[1];
-        let differ = if itself { a } else { a - b };
-        crossings += f64::from(outline.crossings) * differ * differ;
-        for (sum, of) in roughness.iter_mut().zip(&outline.roughness) {
-            sum.add(of, if itself { a * a } else { 2.0 * a * b });
-        }
-    }
-    let [rows, columns] = roughness.map(|roughness| roughness.variance());
-    VARIANCE_PER_CROSSING * crossings + rows + columns
+    let mut terms: Vec<[f64; 5]> = outlines
+        .iter()
+        .map(|outline| {
+            let [a, b] = outline.faces.map(&worth);
+            let itself = outline.faces[0] == outline.faces[1];
+            let differ = if itself { a } else { a - b };
+            let times = if itself { a * a } else { 2.0 * a * b };
+            let [Roughness([r1, r2]), Roughness([c1, c2])] = outline.roughness;
+            let crossings = f64::from(outline.crossings) * differ * differ;
+            [crossings, times * r1, times * r2, times * c1, times * c2]
+        })
+        .collect();
+    // materials have no order that is the same for all who name them: so what is added is sorted
+    let mut sum_of = |k: usize| {
+        terms.sort_unstable_by(|a, b| a[k].total_cmp(&b[k]));
+        terms.iter().map(|term| term[k]).sum::<f64>()
+    };
+    let crossings = sum_of(0);
+    let rows = Roughness([sum_of(1), sum_of(2)]);
+    let columns = Roughness([sum_of(3), sum_of(4)]);
+    VARIANCE_PER_CROSSING * crossings + rows.variance() + columns.variance()
 }
 
 /// Counts of the outlines of a direction; memory is kept from direction to direction.

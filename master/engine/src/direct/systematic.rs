@@ -5,9 +5,11 @@
 //! between rows (Matheron's transitive theory; Gundersen & Jensen 1987), once it is known how smooth g is, which the
 //! differences between rows one, two and four apart tell (Kiêu, Souchet & Istas 1999; García-Fiñana & Cruz-Orive 2004):
 //!
+//! ```text
 //!     Var = α(q) (3 C0 - 4 C1 + C2),   C_k = sum of g_j g_(j+k)
 //!     α(q) = Γ(2q+2) ζ(2q+2) cos(πq) / ((2π)^(2q+2) (1 - 2^(2q-1)))
 //!     2q+1 = log2 of (3 C0 - 4 C2 + C4) / (3 C0 - 4 C1 + C2)
+//! ```
 //!
 //! q = 0 where g jumps, as at an edge that runs along the rows (an edge of n points: n²/12), 1/2 at a smooth rim, 1
 //! where g has kinks only.
@@ -42,12 +44,6 @@ impl Roughness {
             four += (w[0] + w[1] + w[2] + w[3]) * (v[0] + v[1] + v[2] + v[3]);
         }
         Self([2.0 * one - 0.5 * two, 2.0 * two - 0.5 * four])
-    }
-
-    /// This one, so many times over, added to another.
-    pub(super) fn add(&mut self, other: &Self, times: f64) {
-        self.0[0] += times * other.0[0];
-        self.0[1] += times * other.0[1];
     }
 
     /// The variance of the sum over rows.
