@@ -14,20 +14,25 @@ pub const UNBALANCED: &str = "refused as out of balance";
 
 /// A scene by its seed. It need not balance better than so few lines can tell.
 pub fn case(seed: u64) -> Case {
-    case_of(seed, false, 0.25)
+    case_of((seed, false), 0.25, 1)
 }
 
 /// The same with faces that stand twice, or lie in the plane of another one.
 pub fn doubled(seed: u64) -> Case {
-    case_of(seed, true, 0.25)
+    case_of((seed, true), 0.25, 1)
 }
 
 /// The same with another limit of memory.
 pub fn case_within(seed: u64, memory_GiB: f64) -> Case {
-    case_of(seed, false, memory_GiB)
+    case_of((seed, false), memory_GiB, 1)
 }
 
-fn case_of(seed: u64, doubled: bool, memory_GiB: f64) -> Case {
+/// The same with another seed of the sampling.
+pub fn case_sampled(seed: u64, sampling: u64) -> Case {
+    case_of((seed, false), 0.25, sampling)
+}
+
+fn case_of((seed, doubled): (u64, bool), memory_GiB: f64, sampling: u64) -> Case {
     Case::new(
         "Wild",
         seed.to_string(),
@@ -46,6 +51,7 @@ fn case_of(seed: u64, doubled: bool, memory_GiB: f64) -> Case {
             let settings = Settings {
                 accuracy_percent: 10.0,
                 memory_GiB,
+                seed: sampling,
                 ..Settings::default()
             };
             let plan = match try_plan(&scene, &settings) {

@@ -177,10 +177,12 @@ impl<'a> Under<'a> {
         let steps = lattice.place(corner + soil.cell_m.extend(0.0)) - lattice.place(corner);
         let is_large = steps.min_element() >= LARGE.sqrt();
         let of_point = lattice.line_area_m2 / (lattice.direction.z * soil.cell_area_m2());
-        let cells = (0..self.frame.ends.soil_cells).map(|cell| {
+        let seen = |cell: u32| f64::from(visible[self.frame.ends.soil(cell) as usize]);
+        let cells = 0..self.frame.ends.soil_cells;
+        let lit = cells.map(|cell| {
             let [column, row] = [cell % soil.cells[0], cell / soil.cells[0]];
             let met = f64::from(across[column as usize] * along[row as usize]);
-            let seen = f64::from(visible[self.frame.ends.soil(cell) as usize]);
+            let seen = seen(cell);
             let (part, variance) = if is_large && met > 0.0 {
                 let part = seen / met;
                 // binomial, for the points that meet it
@@ -194,8 +196,20 @@ impl<'a> Under<'a> {
                 variance,
             }
         });
-        cells
-            .filter(|lit| lit.part > 0.0 || lit.variance > 0.0)
-            .collect()
+        let mut lit: Vec<LitCell> = lit.collect();
+        // together they get the light of all points that show them
+        let points: f64 = (0..self.frame.ends.soil_cells).map(seen).sum();
+        let dealt: f64 = lit.iter().map(|lit| lit.part).sum();
+        let scale = if dealt > 0.0 {
+            points * of_point / dealt
+        } else {
+            1.0
+        };
+        for lit in &mut lit {
+            lit.variance += (lit.part * (scale - 1.0)).powi(2);
+            lit.part *= scale;
+        }
+        lit.retain(|lit| lit.part > 0.0 || lit.variance > 0.0);
+        lit
     }
 }
