@@ -18,7 +18,7 @@ const ANSWER: Duration = Duration::from_secs(15);
 /// Solves that have ended and are shown: the last ones.
 const MOST_ENDED: usize = 10;
 
-/// Say what a master is doing: its workers, solves, jobs and rates
+/// Show what a master is doing: its workers, solves, jobs and rates
 #[derive(Debug, Args)]
 pub(crate) struct StatusArgs {
     /// The master

@@ -144,7 +144,7 @@ function ofMaterials(divisor, part) {
 }
 
 function showErrors() {
-  element('errors').innerHTML = table(['band', 'standard error of an organ', 'closure in its own standard errors'], report.errors.map((error, k) => {
+  element('errors').innerHTML = table(['band', 'standard error of organs', 'closure in its own standard errors'], report.errors.map((error, k) => {
     const closure = report.balance[k].closure_W;
     const rms = error.rms_percent === null ? '—' : `${fixed(error.rms_percent, 2)} %`;
     return [html(error.band), rms, closure.se > 0 ? fixed(Math.abs(closure.value) / closure.se, 1) : '—'];
@@ -167,7 +167,7 @@ function showFacts() {
   const index = report.area_index === null ? '' : ` · area index ${figure(report.area_index, 3)} (one-sided area of leaves and stems, per area of ${groundName}, ${groundSize})`;
   element('facts').textContent = `${plants} plants, ${organs.length} organs, ${triangles.toLocaleString('en')} triangles${index} · ${report.light} (${sources} sources)`;
   element('reasons').innerHTML = report.reasons.map((reason) => `<li>${html(reason)}</li>`).join('');
-  element('cost').textContent = `nestrad ${version}, seed ${seed}; ${figure(resources.wall_s, 3)} s, ${figure(resources.cpu_s, 3)} s of processor time.`;
+  element('cost').textContent = `nestrad ${version}, seed ${seed}; ${figure(resources.wall_s, 3)} s elapsed, ${figure(resources.cpu_s, 3)} s of CPU time.`;
 }
 
 function startView() {
