@@ -80,7 +80,11 @@ fn a_file_that_is_damaged_costs_time_and_nothing_else() {
     fs::write(&path, b"this is no database").unwrap();
     let args = ["solve", SCENE, "--state", "state", "--out", "third"];
     let output = desk.done(&args);
-    assert!(said(&output).contains("the file is renamed to"), "{}", said(&output));
+    assert!(
+        said(&output).contains("the file is renamed to"),
+        "{}",
+        said(&output)
+    );
     assert!(expected == desk.tables("third"));
 }
 
