@@ -84,7 +84,7 @@ impl fmt::Display for SunFacts {
         } = self;
         write!(
             f,
-            "{elevation_deg:.2} degrees above the horizon, azimuth {azimuth_deg:.2} degrees from north (y) over east (x)"
+            "{elevation_deg:.2} degrees above the horizon, azimuth {azimuth_deg:.2} degrees from north (y) through east (x)"
         )
     }
 }
@@ -143,7 +143,7 @@ pub fn inspect(canopy: &Canopy, origins: &Origins) -> Inspection {
         .max((upper + canopy.origin_m).abs());
     if farthest.max_element() > FAR_M {
         facts.warnings.push(format!(
-            "coordinates reach {} m from zero, where they are rounded to more than a micrometre",
+            "coordinates reach {} m from zero: rounding errors there are larger than one micrometre",
             farthest.max_element()
         ));
     }

@@ -28,7 +28,7 @@ const MAX_HEADERS: u32 = 16 << 10;
 #[derive(Args, Clone, Debug, Default)]
 #[command(next_help_heading = "Access")]
 pub struct Access {
-    /// Certificate of this master, PEM: callers then use https
+    /// Certificate of this master, PEM: clients and workers then use https
     #[arg(long, value_name = "FILE", requires = "tls_key")]
     pub tls_cert: Option<PathBuf>,
 
@@ -36,24 +36,24 @@ pub struct Access {
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     pub tls_key: Option<PathBuf>,
 
-    /// Authority of the clients, PEM: who has a certificate of it may solve
+    /// Certificate authority of clients, PEM: a client with a certificate from it may solve
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     pub client_ca: Option<PathBuf>,
 
-    /// Authority of the workers, PEM: who has a certificate of it may compute for this master, and nothing
-    /// else
+    /// Certificate authority of workers, PEM: a worker with a certificate from it may compute for this master,
+    /// and nothing else
     #[arg(long, value_name = "FILE", requires = "tls_cert")]
     pub worker_ca: Option<PathBuf>,
 
-    /// File with the token of clients: who shows it may solve
+    /// File with the token of clients: a client that sends it may solve
     #[arg(long, value_name = "FILE")]
     pub client_token: Option<PathBuf>,
 
-    /// File with the token of workers: who shows it may compute for this master, and nothing else
+    /// File with the token of workers: a worker that sends it may compute for this master, and nothing else
     #[arg(long, value_name = "FILE")]
     pub worker_token: Option<PathBuf>,
 
-    /// Allow addresses that other machines reach without encryption
+    /// Allow unencrypted connections at addresses that other machines can reach
     #[arg(long)]
     pub allow_plaintext: bool,
 }
@@ -117,7 +117,7 @@ impl Access {
 pub enum AccessError {
     /// Others could read along.
     #[error(
-        "{address} is reached from other machines: expected --tls-cert and --tls-key, or --allow-plaintext"
+        "other machines can reach {address}: expected --tls-cert and --tls-key, or --allow-plaintext"
     )]
     Plaintext {
         /// Where it was to listen.
@@ -125,7 +125,7 @@ pub enum AccessError {
     },
     /// Anybody could come in.
     #[error(
-        "{address} is reached from other machines: expected --client-token and --worker-token, or --client-ca and --worker-ca"
+        "other machines can reach {address}: expected --client-token and --worker-token, or --client-ca and --worker-ca"
     )]
     Open {
         /// Where it was to listen.

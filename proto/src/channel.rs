@@ -33,7 +33,7 @@ pub struct Credentials {
     #[arg(long, value_name = "FILE")]
     pub ca: Option<PathBuf>,
 
-    /// Own certificate, PEM, for a master that asks for one
+    /// Certificate of this client or worker, PEM, for a master that asks for one
     #[arg(long, value_name = "FILE", requires = "key")]
     pub cert: Option<PathBuf>,
 
@@ -41,7 +41,7 @@ pub struct Credentials {
     #[arg(long, value_name = "FILE", requires = "cert")]
     pub key: Option<PathBuf>,
 
-    /// File with the token that the master knows the caller by [default: the variable NESTRAD_TOKEN]
+    /// File with the token for the master [default: the variable NESTRAD_TOKEN]
     #[arg(long, value_name = "FILE")]
     pub token_file: Option<PathBuf>,
 }

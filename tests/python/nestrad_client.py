@@ -36,7 +36,7 @@ class Geometry:
     organs: list  # of (plant, organ), both str
     materials: list  # of (name, LEAF | STEM | SOIL | STRUCTURE)
     pattern_m: tuple | None = None  # min x, min y, max x, max y; None: the scene stands alone
-    soil_z_m: float | None = None  # None: a black void below
+    soil_z_m: float | None = None  # None: light escapes downwards
     species: list | None = None  # one str per organ: plants of two species may have equal names
 
 
@@ -53,8 +53,8 @@ class Band:
 class Sources:
     """Parallel sources above the canopy."""
 
-    direction: np.ndarray  # (sources, 3), of travel
-    irradiance_W_m2: np.ndarray  # (sources, bands), of the horizontal
+    direction: np.ndarray  # (sources, 3), in which the light travels
+    irradiance_W_m2: np.ndarray  # (sources, bands), on a horizontal surface
 
 
 @dataclass
@@ -93,11 +93,11 @@ class Master:
         self._channel.close()
 
     def upload(self, geometry, bands, sources):
-        """Hands in a scene. The answer has scene_id, geometry_id, facts and warnings."""
+        """Uploads a scene. The answer has scene_id, geometry_id, facts and warnings."""
         return self._upload(_slices(geometry, bands, sources))
 
     def relight(self, geometry_id, bands, sources):
-        """Hands in other light and optics for a geometry that the master holds."""
+        """Uploads other light and optics for a geometry that the master holds."""
         header = _header(bands, sources)
         header.geometry_id = geometry_id
         return self._upload([scene_pb.SceneSlice(header=header)])
@@ -106,8 +106,8 @@ class Master:
         return self._stub.UploadScene(iter(slices), metadata=self._metadata)
 
     def solve(self, scene_id, progress=None, **options):
-        """Solves, and waits for the end; `options` are the fields of SolveOptions. `progress` is called
-        with every message on the way. Ctrl-C, or any other exception, cancels the solve at the master.
+        """Starts a solve and waits for its end; `options` are the fields of SolveOptions. `progress` is called
+        with every message of the master. Ctrl-C, or any other exception, cancels the solve at the master.
         Returns the name of the solve."""
         request = pb.StartSolveRequest(scene_id=scene_id, options=pb.SolveOptions(**options))
         solve_id = self._stub.StartSolve(request, timeout=60, metadata=self._metadata).solve_id

@@ -151,7 +151,7 @@ def arguments():
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--master", required=True, metavar="HOST:PORT")
     parser.add_argument("--ca", type=Path, help="certificate authority of the master, PEM")
-    parser.add_argument("--accuracy", type=float, default=1.0, metavar="PERCENT")
+    parser.add_argument("--accuracy", type=float, default=1.0, metavar="PERCENT", help="target error")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE")
     parser.add_argument("--files", type=Path, metavar="DIR")
     return parser.parse_args()

@@ -125,7 +125,11 @@ fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
     assert_eq!(accuracy.ended, Ended::OutOfTime);
     assert_eq!(accuracy.rounds.len(), 1);
     assert!(accuracy.rounds[0].reached_percent.unwrap() > 0.1);
-    assert!(accuracy.to_string().contains("the time allowed is up"));
+    assert!(
+        accuracy
+            .to_string()
+            .contains("--budget leaves no time for a finer round")
+    );
 }
 
 #[test]

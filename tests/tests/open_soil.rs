@@ -184,7 +184,7 @@ fn accuracy_refines_soil_cells() {
     let scenery = disc();
     let plain = solve(&scenery.scene(), &Settings::default()).solution;
     assert!(plain.account[0].soil_percent > 0.5, "{:?}", plain.account);
-    assert_eq!(plain.account[0].largest(), "size of soil cells");
+    assert_eq!(plain.account[0].largest(), "soil cell size");
     let settings = Settings {
         accuracy_percent: 0.2,
         in_rounds: true,

@@ -16,8 +16,8 @@ use tracing_subscriber::EnvFilter;
 
 /// Computes near-field jobs for a nestrad master.
 ///
-/// It dials the master, and can come and go at any time. SIGTERM or Ctrl-C lets it finish or give back
-/// its jobs and leave. Logs go to stderr; RUST_LOG says how much.
+/// It connects to the master, and can join and leave at any time. On SIGTERM or Ctrl-C it finishes its jobs or
+/// gives them back, and exits. It logs to stderr; RUST_LOG sets the level.
 #[derive(Debug, Parser)]
 #[command(name = "nestrad-worker", version)]
 pub(crate) struct Cli {
@@ -25,19 +25,19 @@ pub(crate) struct Cli {
     #[arg(long, value_name = "URL")]
     master: String,
 
-    /// Jobs to compute at a time, one a thread; 0 for one per processor
+    /// Number of threads, each with one job at a time; 0 for one per processor
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: u32,
 
-    /// Memory that it may take, GiB [default: three quarters of what the machine has free]
+    /// Memory that the worker may take, GiB [default: three quarters of the free memory of the machine]
     #[arg(long, value_name = "GIB", value_parser = positive)]
     memory: Option<f64>,
 
-    /// What the master calls it [default: the host's name]
+    /// Name of this worker at the master [default: the host's name]
     #[arg(long, value_name = "NAME")]
     name: Option<String>,
 
-    /// Leave when stdin closes: for a parent that may die
+    /// Exit when stdin closes: for a parent process that may end without notice
     #[arg(long)]
     with_stdin: bool,
 

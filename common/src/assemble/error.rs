@@ -48,7 +48,7 @@ pub enum LoadError {
     },
     /// Two files have an organ of the same name, which would be one row of the results.
     #[error(
-        "{again}: {organ} is in {first} already; expected every organ in one file: number plants or species through all files"
+        "{again}: {organ} is in {first} already; expected each organ in one file only: give plants or species of each file other numbers"
     )]
     OrganTwice {
         /// Where it is met again.
@@ -105,7 +105,7 @@ pub enum LoadError {
         band: String,
     },
     /// Results could not be told apart.
-    #[error("band names must differ and not be empty, found '{name}' twice or empty")]
+    #[error("expected band names that differ and are not empty, found '{name}' twice or empty")]
     BandName {
         /// The name.
         name: String,

@@ -234,13 +234,13 @@ mod tests {
         let bow_tie = format!("{LEAF}p 1 100001001001 4 0 0 1 1 1 1 1 0 1 0 1 1\n");
         assert_eq!(
             refusal(bow_tie),
-            "a.can, line 2: expected a polygon whose edges do not cross, found the edges from vertex 1 \
-             and from vertex 3, which do"
+            "a.can, line 2: expected a polygon whose edges do not cross, found a crossing of the edges \
+             that begin at vertex 1 and at vertex 3"
         );
         assert_eq!(
             refusal("p 1 100001001001 4 0 0 1 1 0 1 1 1 3 0 1 1\n"),
-            "a.can, line 1: expected a nearly flat polygon, of whose triangles the area is at most 10 % \
-             more than that in its mean plane, found 29 % more"
+            "a.can, line 1: expected a nearly flat polygon, whose triangles have at most 10 % \
+             more area than it has in its mean plane, found 29 % more"
         );
     }
 

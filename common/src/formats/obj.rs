@@ -105,7 +105,7 @@ const PASSED_OVER: [&[u8]; 31] = [
 const CURVED: [&[u8]; 7] = [b"curv", b"curv2", b"surf", b"bsp", b"bzp", b"cdc", b"cdp"];
 
 fn passed_over(place: Place) -> String {
-    format!("curves and curved surfaces are passed over, the first in {place}")
+    format!("curves and curved surfaces are ignored, the first in {place}")
 }
 
 /// All vertices of the file.

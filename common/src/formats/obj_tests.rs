@@ -84,7 +84,7 @@ fn fault_statements_that_say_nothing_of_triangles_were_refused() {
     let curved = "cstype bspline\ndeg 3\ncurv 0.0 1.0 1 2 3 4\nparm u 0 0 0 \\\n 1 1 1\nend\n";
     let file = parsed(&format!("{curved}f 1 2 3")).unwrap();
     assert_eq!(file.mesh, plain.mesh);
-    let warning = "curves and curved surfaces are passed over, the first in a.obj, line 7";
+    let warning = "curves and curved surfaces are ignored, the first in a.obj, line 7";
     assert_eq!(file.warnings, [warning]);
 }
 
@@ -159,8 +159,8 @@ fn a_concave_face_is_cut_into_its_area() {
     assert_eq!(areas.iter().sum::<f64>(), 3.0);
     assert_eq!(
         parsed("f 1 3 2 4").unwrap_err(),
-        "a.obj, line 5: expected a polygon whose edges do not cross, found the edges from vertex 1 \
-         and from vertex 3, which do"
+        "a.obj, line 5: expected a polygon whose edges do not cross, found a crossing of the edges \
+         that begin at vertex 1 and at vertex 3"
     );
     let many = format!("f{}", " 1".repeat(MAX_VERTICES + 1));
     let error = parsed(&many).unwrap_err();

@@ -35,9 +35,9 @@ pub(super) enum PolygonFault {
     Folded { more: f64 },
     #[error("one that folds over itself")]
     FoldsOver,
-    #[error("the edges from vertex {} and from vertex {}, which do", edges[0], edges[1])]
+    #[error("a crossing of the edges that begin at vertex {} and at vertex {}", edges[0], edges[1])]
     Crosses { edges: [usize; 2] },
-    #[error("one that lies on itself")]
+    #[error("one that overlaps itself")]
     Overlaps,
 }
 
@@ -46,7 +46,7 @@ impl PolygonFault {
     pub(super) fn expected(&self) -> String {
         match self {
             Self::Folded { .. } | Self::FoldsOver => format!(
-                "a nearly flat polygon, of whose triangles the area is at most {} % more than that in its mean plane",
+                "a nearly flat polygon, whose triangles have at most {} % more area than it has in its mean plane",
                 100.0 * MAX_FOLD
             ),
             Self::Crosses { .. } | Self::Overlaps => {

@@ -112,7 +112,7 @@ pub enum SunError {
         given: String,
     },
     /// A time with an offset from UTC.
-    #[error("time '{given}': expected UTC, which ends in Z, in +00:00 or in nothing")]
+    #[error("time '{given}': expected UTC, with Z, +00:00 or nothing at its end")]
     NotUtc {
         /// As given.
         given: String,

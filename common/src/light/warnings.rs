@@ -38,13 +38,13 @@ impl Light {
         let limit_W_m2 = share(bands[band]) * SOLAR_CONSTANT;
         let found_W_m2 = across(brightest);
         let band = match bands[band] {
-            "" => "a band".to_owned(),
+            "" => "one band".to_owned(),
             name => format!("band {name}"),
         };
         (found_W_m2 > limit_W_m2).then(|| {
             format!(
-                "in {band} a beam {:.2} degrees above the horizon brings {found_W_m2:.0} W m-2 across its direction, \
-                 the sun outside the atmosphere {limit_W_m2:.0} W m-2: is its irradiance right?",
+                "{band}: a source {:.2} degrees above the horizon has {found_W_m2:.0} W m-2 perpendicular to its direction, \
+                 more than the sun outside the atmosphere ({limit_W_m2:.0} W m-2): is its irradiance right?",
                 brightest.elevation_deg(),
             )
         })
@@ -73,8 +73,8 @@ mod tests {
         assert_eq!(
             warnings(80.0, 0.5, "solar"),
             [
-                "in band solar a beam 0.50 degrees above the horizon brings 9167 W m-2 across its direction, \
-                 the sun outside the atmosphere 1361 W m-2: is its irradiance right?"
+                "band solar: a source 0.50 degrees above the horizon has 9167 W m-2 perpendicular to its direction, \
+                 more than the sun outside the atmosphere (1361 W m-2): is its irradiance right?"
             ]
         );
         for (irradiance_W_m2, elevation_deg, band, warns) in [

@@ -85,7 +85,7 @@ impl Door {
             );
         runtime.spawn(async {
             if let Err(error) = serving.await {
-                tracing::error!(%error, "the door for workers broke");
+                tracing::error!(%error, "the service for workers failed");
             }
         });
         drop(entered);

@@ -67,7 +67,7 @@ impl WorkerService for Service {
         let limits = &cluster.0.limits;
         let mut state = cluster.lock();
         if state.scheduler.facts().count() >= limits.workers {
-            let text = format!("{} workers are enough", limits.workers);
+            let text = format!("expected at most {} workers", limits.workers);
             return Err(Status::resource_exhausted(text));
         }
         tracing::info!(name = %facts.name, threads = facts.threads, "worker joins");

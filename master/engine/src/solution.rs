@@ -128,9 +128,9 @@ impl BandAccount {
         [
             (self.exchange_percent, "exchange"),
             (self.direct_percent, "direct light"),
-            (self.sky_percent, "directions of the sky"),
-            (self.elements_percent, "size of elements"),
-            (self.soil_percent, "size of soil cells"),
+            (self.sky_percent, "sky directions"),
+            (self.elements_percent, "element size"),
+            (self.soil_percent, "soil cell size"),
             (self.far_field_percent, "far field"),
             (self.solver_percent, "solver"),
         ]

@@ -21,7 +21,7 @@ pub enum SolveError {
     Solver(SolverError),
     /// Light is lost or gained, far beyond what the sampling leaves uncertain.
     #[error(
-        "the energy balance of band {band} does not close: {:.1} % of the incoming light is unaccounted for, where sampling leaves {:.1} % uncertain: faces of very different size see each other by too few lines, expected a finer --accuracy or a scene whose parts are nearer in size",
+        "the energy balance of band {band} does not close: the closure is {:.1} % of the incoming light, its standard error {:.1} %: too few lines join faces of very different size, expected a smaller --accuracy or a scene with parts of more similar size",
         100.0 * missing,
         100.0 * stated
     )]

@@ -41,21 +41,21 @@ type Flow = (&'static str, fn(&Balance) -> Estimate);
 fn flows(balance: &[Balance]) -> Vec<Flow> {
     let always: [Flow; 2] = [
         ("plants", |b| b.absorbed_plants_W),
-        ("reflected", |b| b.escaped_up_W),
+        ("escaped up", |b| b.escaped_up_W),
     ];
     let only_where_there_is_some: [Flow; 3] = [
         ("structures", |b| b.absorbed_structures_W),
         ("soil", |b| b.absorbed_soil_W),
-        ("lost below", |b| b.escaped_down_W),
+        ("escaped down", |b| b.escaped_down_W),
     ];
-    let [plants, reflected] = always;
+    let [plants, escaped_up] = always;
     let mut flows = vec![plants];
     flows.extend(
         only_where_there_is_some
             .into_iter()
             .filter(|(_, flow)| balance.iter().any(|b| matters(flow(b), b.incoming_W))),
     );
-    flows.extend([reflected, ("closure", |b: &Balance| b.closure_W)]);
+    flows.extend([escaped_up, ("closure", |b: &Balance| b.closure_W)]);
     flows
 }
 
@@ -224,7 +224,7 @@ fn write_organ_errors(
     canopy: &Canopy,
     solution: &Solution,
 ) -> io::Result<()> {
-    let mut line = String::from("standard error of an organ, rms, of the mean:");
+    let mut line = String::from("standard error of organs, rms, in percent of the mean:");
     for spread in organ_spread(&canopy.plants(), solution) {
         let Some(percent) = spread.rms_percent else {
             continue;
@@ -244,7 +244,7 @@ fn write_organ_errors(
 
 fn write_usage(out: &mut impl Write, usage: Usage) -> io::Result<()> {
     let mut line = format!(
-        "{:.2} s, {:.2} s of processor time",
+        "{:.2} s elapsed, {:.2} s of CPU time",
         usage.wall_s, usage.cpu_s
     );
     if let Some(bytes) = usage.peak_memory_bytes {
@@ -339,11 +339,11 @@ mod tests {
         );
         let expected = "\
 light in W per m² of ground (± one standard error)
-band  incoming        plants         soil    reflected     closure
+band  incoming        plants         soil   escaped up     closure
 PAR     450.00  380.12 ±0.15  40.00 ±0.10  29.89 ±0.12  0.00 ±0.01
 NIR     360.00  304.10 ±0.12  32.00 ±0.08  23.92 ±0.10  0.00 ±0.01
-standard error of an organ, rms, of the mean: PAR 0.50 %; NIR 0.50 %
-1.23 s, 2.35 s of processor time, at most 300 MiB of memory
+standard error of organs, rms, in percent of the mean: PAR 0.50 %; NIR 0.50 %
+1.23 s elapsed, 2.35 s of CPU time, at most 300 MiB of memory
 ";
         assert_eq!(text, expected);
     }
@@ -355,10 +355,10 @@ standard error of an organ, rms, of the mean: PAR 0.50 %; NIR 0.50 %
         let text = shown(None, vec![balance]);
         let expected = "\
 light in mW, whole scene (± one standard error)
-band  incoming         plants    lost below     reflected       closure
+band  incoming         plants  escaped down    escaped up       closure
 PAR     90.000  76.025 ±0.030  8.000 ±0.021  5.979 ±0.024  0.000 ±0.002
-standard error of an organ, rms, of the mean: PAR 0.50 %
-1.23 s, 2.35 s of processor time, at most 300 MiB of memory
+standard error of organs, rms, in percent of the mean: PAR 0.50 %
+1.23 s elapsed, 2.35 s of CPU time, at most 300 MiB of memory
 ";
         assert_eq!(text, expected);
     }
@@ -381,7 +381,7 @@ standard error of an organ, rms, of the mean: PAR 0.50 %
         ];
         let expected = "\
 light in W per m² of ground (± one standard error)
-band  incoming        plants    structures         soil    reflected     closure
+band  incoming        plants    structures         soil   escaped up     closure
 PAR     450.00  280.12 ±0.15  100.00 ±0.15  40.00 ±0.10  29.89 ±0.12  0.00 ±0.01
 absorbed by                    kind           PAR
 leaf of species 1              leaf  250.00 ±0.10

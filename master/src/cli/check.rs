@@ -13,10 +13,10 @@ use nestrad_common::options::Options;
 use super::console::{self, Notes};
 use super::flags::SceneFlags;
 
-/// Say what is in a scene and what is wrong with it; compute nothing
+/// Show what is in a scene and what is wrong with it; compute nothing
 ///
-/// Needs geometry; optics and light are checked where they are given. Facts and warnings go to stdout. The exit code
-/// is 1 where `solve` would refuse what is given.
+/// Geometry is required; optics and light are checked if they are given. Facts and warnings go to stdout. The
+/// exit code is 1 if `solve` would refuse what is given.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
     #[command(flatten)]
@@ -39,14 +39,12 @@ impl CheckArgs {
         }
         match (&canopy, &optics) {
             (Some((canopy, _)), Some(optics)) => facts.optics(canopy, optics),
-            _ if inputs.bands.is_empty() => facts.line("band", "none is given, which solve needs"),
+            _ if inputs.bands.is_empty() => facts.line("band", "none is given; solve needs one"),
             _ => {}
         }
         match &light {
             Some(light) => facts.light(light, &light_bands),
-            None if inputs.light.is_none() => {
-                facts.line("light", "none is given, which solve needs")
-            }
+            None if inputs.light.is_none() => facts.line("light", "none is given; solve needs it"),
             None => {}
         }
         if let Some((_, inspection)) = &canopy {
@@ -102,7 +100,7 @@ impl Facts {
         self.line("pattern", &pattern);
         let soil = match facts.soil_z_m {
             Some(z) => format!("a plane at z = {} m", fixed(z, 3)),
-            None => "no plane: a black void below".to_owned(),
+            None => "no plane: light escapes downwards".to_owned(),
         };
         self.line("soil", &soil);
         if let Some(index) = facts.area_index {

@@ -19,25 +19,25 @@ use super::numbers::number;
 pub(crate) struct SceneFlags {
     /// The canopy: CAN or OBJ files (.can, .obj, plain or .gz), or a scene file (.toml)
     ///
-    /// A scene file may say all that flags say; flags win over it. Geometry files given
-    /// beside a scene file take the place of those that it names.
+    /// A scene file can hold all that flags can say; a flag replaces what the file says. Geometry files given
+    /// with a scene file replace those that it names.
     #[arg(required = true, value_name = "SCENE", help_heading = "Arguments")]
     scenes: Vec<PathBuf>,
 
-    /// Optical properties of a wavelength band, one .opt file a band; repeat for more bands
+    /// Optical properties of a wavelength band: one .opt file for each band; repeat for more bands
     ///
-    /// NAME is yours, and is found again in the results: --optics PAR=par.opt --optics NIR=nir.opt
+    /// You choose NAME, and the results use it: --optics PAR=par.opt --optics NIR=nir.opt
     #[arg(long, value_name = "NAME=FILE", value_parser = named_file)]
     optics: Vec<(String, PathBuf)>,
 
-    /// Sources of light, from a .light file for all bands, or from one file a band (NAME=FILE)
+    /// Sources of light: one .light file for all bands, or one file for each band (NAME=FILE)
     ///
-    /// A line of the file is a parallel source: irradiance of the horizontal (W m-2) and direction of
+    /// Each line of the file is a parallel source: irradiance on a horizontal surface (W m-2) and direction of
     /// travel x y z.
     #[arg(long, value_name = "FILE|NAME=FILE", value_parser = light_file)]
     light: Vec<(Option<String>, PathBuf)>,
 
-    /// A built-in sky in place of --light, as bright as --irradiance says
+    /// A built-in sky instead of --light; needs --irradiance
     #[arg(
         long,
         value_enum,
@@ -47,7 +47,7 @@ pub(crate) struct SceneFlags {
     )]
     sky: Option<SkyKind>,
 
-    /// Irradiance of the horizontal above the canopy in a band, W m-2; once for each band
+    /// Irradiance of the sky on a horizontal surface above the canopy in a band, W m-2; once for each band
     #[arg(long, value_name = "NAME=W_m2", value_parser = named_number, requires = "sky")]
     irradiance: Vec<(String, f64)>,
 
@@ -82,7 +82,7 @@ pub(crate) struct SceneFlags {
     )]
     longitude: Option<f64>,
 
-    /// Clear sky: the part of the irradiance that does not come straight from the sun, 0 to 1
+    /// Clear sky: the diffuse part of the irradiance, 0 to 1; the rest comes directly from the sun
     #[arg(
         long,
         value_name = "PART",
@@ -93,11 +93,11 @@ pub(crate) struct SceneFlags {
     )]
     diffuse_fraction: Option<f64>,
 
-    /// The rectangle on which the canopy repeats for ever, a .8 file [default: the canopy stands alone]
+    /// The rectangle on which the canopy repeats without end, a .8 file [default: the canopy stands alone]
     #[arg(long, value_name = "FILE")]
     pattern: Option<PathBuf>,
 
-    /// Height of a horizontal soil plane, in --unit [default: no soil, a black void below]
+    /// Height of a horizontal soil plane, in --unit [default: no soil plane, light escapes downwards]
     #[arg(long, value_name = "Z", value_parser = number, allow_negative_numbers = true)]
     soil: Option<f64>,
 
@@ -105,8 +105,8 @@ pub(crate) struct SceneFlags {
     #[arg(long)]
     unit: Option<Unit>,
 
-    /// The axis of the geometry files that points up: y or z. With y, a file's x stays, its y becomes z and its z
-    /// becomes -y; pattern, --soil and light have z up always [default: z]
+    /// The axis of the geometry files that points up: y or z. With y, the x of a file stays, its y becomes z
+    /// and its z becomes -y; in pattern, --soil and light z always points up [default: z]
     #[arg(long, value_name = "AXIS")]
     up: Option<Up>,
 }

@@ -15,9 +15,9 @@ use super::numbers::{number, whole};
 
 /// Write a made-up canopy, with optics, light and a scene file, for `nestrad solve DIR/scene.toml`
 ///
-/// The same options give the same files, byte for byte. Files of an earlier canopy are replaced as long as
-/// nobody has changed them; others stay, and nothing is written, unless --force is given. Plants are plausible, not calibrated on any
-/// cultivar. Lengths are in metres.
+/// The same options give the same files, byte for byte. Files of an earlier canopy are replaced if nobody has
+/// changed them. If a file was changed, or something else wrote it, nothing is written unless --force is given.
+/// Plants are plausible, but not calibrated on any cultivar. Lengths are in metres.
 #[derive(Debug, Args)]
 pub(crate) struct GenerateArgs {
     #[command(subcommand)]
@@ -36,11 +36,11 @@ enum Canopy {
 
 #[derive(Debug, Args)]
 struct Place {
-    /// Folder for the files; made if there is none
+    /// Folder for the files; created if it does not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
-    /// Overwrite files of the same names that something else has made, or that were changed since
+    /// Overwrite files of the same names even if something else wrote them, or if they were changed afterwards
     #[arg(long)]
     force: bool,
 
@@ -61,15 +61,15 @@ impl Place {
 
 #[derive(Debug, Args)]
 struct PlantFlags {
-    /// Rows x plants in a row; rows run along x. The pattern is the ground they take
+    /// Number of rows x plants in each row; rows run along x. The pattern is the ground that they take
     #[arg(long, value_name = "ROWSxPLANTS", default_value = "2x4")]
     rows: Pair<u32>,
 
-    /// From row to row, metres [default: maize 0.75, bean 0.5]
+    /// Distance between rows, metres [default: maize 0.75, bean 0.5]
     #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     row_spacing: Option<f64>,
 
-    /// From plant to plant in a row, metres [default: maize 0.2, bean 0.1]
+    /// Distance between plants in a row, metres [default: maize 0.2, bean 0.1]
     #[arg(long, value_name = "METRES", value_parser = number, allow_negative_numbers = true)]
     plant_spacing: Option<f64>,
 

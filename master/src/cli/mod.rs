@@ -22,8 +22,8 @@ pub(crate) use console::exit_code;
 
 /// Computes how much light every leaf of a plant canopy absorbs.
 ///
-/// A canopy is a list of triangles, alone or repeated for ever on a rectangle; leaves reflect and
-/// transmit, each face in its own way, in as many wavelength bands as there are optics files. Results
+/// A canopy is a list of triangles that stands alone or repeats on a rectangle without end. Each face of a leaf
+/// has its own reflectance and transmittance, in as many wavelength bands as there are optics files. Results
 /// are tables per organ, triangle and soil cell, with standard errors and an energy balance.
 #[derive(Debug, Parser)]
 #[command(name = "nestrad", version)]

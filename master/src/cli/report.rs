@@ -13,21 +13,21 @@ use super::numbers::whole;
 
 /// Turn the results of `solve` into one HTML page: the canopy in 3D, profiles, balance, errors
 ///
-/// Writes OUT/report.html, which holds all that it shows and loads nothing: it can be sent by mail.
-/// Results are read from their tables, CSV or Parquet, the canopy from where summary.json says that it was.
+/// Writes OUT/report.html, one file that loads nothing else and can be sent by e-mail. It is made from the
+/// tables in OUT, CSV or Parquet, and from the files of the canopy, whose paths are in summary.json.
 #[derive(Debug, Args)]
 pub(crate) struct ReportArgs {
     /// Folder of results, as `nestrad solve --out` wrote it
     #[arg(value_name = "OUT")]
     out: PathBuf,
 
-    /// The canopy, if it is no longer where it was solved: geometry files in the same order, or the
+    /// The files of the canopy, if they were moved after the solve: geometry files in the same order, or the
     /// scene file (.toml)
     #[arg(long, value_name = "FILE")]
     scene: Vec<PathBuf>,
 
-    /// Draw at most so many triangles; a page takes about 60 bytes for each. A larger canopy gets the
-    /// page without the drawing
+    /// Largest number of triangles that is drawn; a page takes about 60 bytes for each. The page of a larger
+    /// canopy has no drawing
     #[arg(long, value_name = "N", default_value_t = 2_000_000, value_parser = whole::<usize>(0..=u64::MAX), allow_negative_numbers = true)]
     most_triangles: usize,
 
@@ -35,11 +35,11 @@ pub(crate) struct ReportArgs {
     #[arg(long, value_name = "FILE")]
     png: Option<PathBuf>,
 
-    /// The band that colours the picture [default: the first]
+    /// Band whose light colours the picture [default: the first]
     #[arg(long, value_name = "NAME", requires = "png")]
     png_band: Option<String>,
 
-    /// Nothing on the terminal but errors
+    /// Print errors only
     #[arg(long, short)]
     quiet: bool,
 }

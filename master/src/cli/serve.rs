@@ -16,25 +16,25 @@ use super::numbers::{positive, whole};
 use super::state::StateFlags;
 use super::workers::lease;
 
-/// Serve solves to clients over gRPC, until told to stop
+/// Serve solves to clients over gRPC until it is stopped
 ///
-/// Clients are `nestrad solve --master` and programs in any language; see docs/operators.md. On
-/// SIGTERM or Ctrl-C nothing new is taken on, what is being computed is ended and given out, and the
-/// exit code is 0. What happens is said on stderr; NESTRAD_LOG sets how much (debug, info, warn).
+/// Clients are `nestrad solve --master` and programs in any language; see docs/operators.md. On SIGTERM or
+/// Ctrl-C the master accepts nothing new, finishes the running solves (see --drain), hands out their results
+/// and exits with code 0. It logs to stderr; NESTRAD_LOG sets the level (debug, info, warn).
 #[derive(Debug, Args)]
 pub(crate) struct ServeArgs {
-    /// Where clients and workers come in; port 0 takes any that is free
+    /// Address for clients and workers; port 0 is any free port
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7410")]
     listen: SocketAddr,
 
     #[command(flatten)]
     access: Access,
 
-    /// A worker that is silent for so long loses its jobs to others, seconds
+    /// After this many seconds of silence, the jobs of a worker go to others
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
 
-    /// Without any worker for so long, the master computes by itself, seconds
+    /// After this many seconds without any worker, the master computes by itself
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
     patience: Duration,
 
@@ -44,7 +44,7 @@ pub(crate) struct ServeArgs {
     #[command(flatten)]
     limits: LimitFlags,
 
-    /// Where Prometheus reads metrics, over plain HTTP at /metrics [default: nowhere]
+    /// Address where Prometheus reads metrics, over plain HTTP at /metrics [default: none]
     #[arg(long, value_name = "ADDRESS:PORT")]
     metrics: Option<SocketAddr>,
 }
@@ -52,11 +52,11 @@ pub(crate) struct ServeArgs {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Limits")]
 struct LimitFlags {
-    /// Threads to compute with, 0 for one per processor
+    /// Number of threads, 0 for one per processor
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u16>(0..=65_535), allow_negative_numbers = true)]
     threads: u16,
 
-    /// Solves that are computed at a time
+    /// Solves that are computed at the same time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u8>(1..=255), allow_negative_numbers = true)]
     solves: u8,
 
@@ -68,15 +68,15 @@ struct LimitFlags {
     #[arg(long, value_name = "GIB", default_value_t = 8.0, value_parser = positive)]
     memory: f64,
 
-    /// Memory of the scenes that are held, GiB; the one not used for longest goes first
+    /// Memory for scenes that are held, GiB; where it is full, the scene that was unused for longest is dropped
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     scene_memory: f64,
 
-    /// Memory of the results that are held, GiB; the oldest go first
+    /// Memory for results that are held, GiB; where it is full, the oldest are dropped
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     result_memory: f64,
 
-    /// Time for solves to end when the master is told to stop; then they are cancelled
+    /// Seconds that running solves have to finish when the master is stopped; then they are cancelled
     #[arg(long, value_name = "SECONDS", default_value_t = 30, value_parser = whole::<u32>(0..=u32::MAX.into()), allow_negative_numbers = true)]
     drain: u32,
 }

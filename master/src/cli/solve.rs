@@ -35,8 +35,8 @@ use super::workers::{Crew, WorkersFlags};
 
 /// Compute the light that every organ, triangle and soil cell of a canopy gets
 ///
-/// DIR gets organs.csv, triangles.csv, soil.csv (where there is a soil plane) and summary.json, or
-/// stays as it is if anything fails. The plan goes to stderr, a table of the energy balance to stdout.
+/// Writes organs.csv, triangles.csv, soil.csv (where there is a soil plane) and summary.json into DIR; after an
+/// error DIR is unchanged. The plan goes to stderr, a table of the energy balance to stdout.
 #[derive(Debug, Args)]
 pub(crate) struct SolveArgs {
     #[command(flatten)]
@@ -64,21 +64,21 @@ struct HowFlags {
     /// Diameter of the sphere around a leaf in which light is exchanged on the true geometry:
     /// auto, inf or metres [default: auto]
     ///
-    /// Beyond it, a multilayer model of the canopy stands in. `inf` needs no model; `auto` is `inf`
-    /// where that fits --memory. Always in metres.
+    /// Beyond it, a multilayer model replaces the geometry. `inf` needs no model; `auto` is `inf` where that
+    /// fits --memory. Always in metres.
     #[arg(long, value_name = "auto|inf|METRES", allow_negative_numbers = true)]
     diameter: Option<Diameter>,
 
-    /// Error to reach, percent, bias included: rms over organs, relative to the canopy's mean [default: 0.5]
+    /// Target error, percent, bias included: rms over organs, relative to the canopy's mean [default: 0.5]
     ///
-    /// It sets how many lines are traced. Where it is given and a round misses it in some band, a finer one
-    /// follows; the default is one round, whatever it reaches.
-    /// It also sets how many directions a built-in sky begins with (1132 at 0.5 %, 476 at 1 %, 200 at 2 %;
-    /// 4000 at most).
+    /// It sets how many lines are traced. With this flag, finer rounds follow until every band meets the
+    /// target; without it there is one round, planned for 0.5 %, which may miss it. It also sets how many
+    /// directions a built-in sky begins with (1132 at 0.5 %, 476 at 1 %, 200 at 2 %; 4000 at most).
     #[arg(long, value_name = "PERCENT", value_parser = positive, allow_negative_numbers = true)]
     accuracy: Option<f64>,
 
-    /// Seconds that the solve may take: it stops with the best that it can reach, and says what that is
+    /// Longest time of the solve, seconds: it stops with the smallest error that it can reach in that time, and
+    /// says which
     ///
     /// Results then depend on how fast the machine is.
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
@@ -88,7 +88,7 @@ struct HowFlags {
     #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
     memory: Option<f64>,
 
-    /// Threads to compute with, 0 for one per processor; results do not depend on it [default: 0]
+    /// Number of threads, 0 for one per processor; results do not depend on it [default: 0]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=4096), allow_negative_numbers = true)]
     threads: Option<usize>,
 
@@ -104,7 +104,7 @@ struct HowFlags {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Results")]
 struct ResultFlags {
-    /// Folder for the results; made if there is none. Files of an earlier result are replaced
+    /// Folder for the results; created if it does not exist. Files of an earlier result are replaced
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
@@ -116,14 +116,14 @@ struct ResultFlags {
     #[arg(long)]
     vtp: bool,
 
-    /// Say nothing but errors: no plan, no progress, no table
+    /// Print errors only: no plan, no progress, no table
     #[arg(long, short)]
     quiet: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
 enum EstimatorFlag {
-    /// Parallel lines through the canopy, completed with rays where they are thin
+    /// Parallel lines through the canopy, with more rays where too few lines pass
     Lines,
     /// Rays from every face: slower, and independent of the lines
     Rays,

@@ -9,14 +9,14 @@ use nestrad_cluster::store::Store;
 use super::numbers::positive;
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "What is kept")]
+#[command(next_help_heading = "Kept results")]
 pub(crate) struct StateFlags {
-    /// Folder in which finished near-field jobs are kept: a solve that was cut short goes on, and the same
-    /// geometry under other lights or with other optics traces nothing
+    /// Folder in which finished near-field jobs are kept: an interrupted solve continues, and a geometry with
+    /// other light or other optics is not traced again
     #[arg(long, value_name = "DIR")]
     state: Option<PathBuf>,
 
-    /// Disk space for --state, GiB; the oldest goes first
+    /// Disk space for --state, GiB; where it is full, the oldest jobs are deleted
     #[arg(long, value_name = "GIB", default_value_t = 16.0, value_parser = positive)]
     state_size: f64,
 }

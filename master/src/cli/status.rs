@@ -18,7 +18,7 @@ const ANSWER: Duration = Duration::from_secs(15);
 /// Solves that have ended and are shown: the last ones.
 const MOST_ENDED: usize = 10;
 
-/// Say what a master is doing: its workers, solves, jobs and rates
+/// Show what a master is doing: its workers, solves, jobs and rates
 #[derive(Debug, Args)]
 pub(crate) struct StatusArgs {
     /// The master
@@ -70,7 +70,7 @@ fn text(status: &v1::StatusResponse) -> String {
         line(
             "worker",
             format!(
-                "{}: {} threads, {:.1} GiB; {} jobs leased, {} done, {} lost; heard of {} ago",
+                "{}: {} threads, {:.1} GiB; {} jobs leased, {} done, {} lost; last message {} ago",
                 printable(&worker.name),
                 worker.threads,
                 worker.memory_gi_b,
@@ -108,7 +108,10 @@ fn text(status: &v1::StatusResponse) -> String {
     let not_shown = status.solves.iter().filter(ended).count();
     let not_shown = not_shown.saturating_sub(MOST_ENDED);
     if not_shown > 0 {
-        line("solves", format!("{not_shown} that have ended, and these:"));
+        line(
+            "solves",
+            format!("{not_shown} older ones that have ended, and these:"),
+        );
     }
     let mut left_out = 0;
     for solve in &status.solves {
@@ -124,23 +127,23 @@ fn text(status: &v1::StatusResponse) -> String {
 fn solve(solve: &v1::SolveInfo) -> String {
     let size = format!("{} triangles, {} bands", solve.triangles, solve.bands);
     let state = match solve.state() {
-        v1::SolveState::Queued => format!("waits since {}", time(solve.age_s)),
+        v1::SolveState::Queued => format!("waiting for {}", time(solve.age_s)),
         v1::SolveState::Running if solve.total > 0 => format!(
-            "runs since {}: {}, {} of {}",
+            "running for {}: {}, {} of {}",
             time(solve.running_s),
             printable(&solve.stage),
             solve.done,
             solve.total
         ),
         v1::SolveState::Running => format!(
-            "runs since {}: {}",
+            "running for {}: {}",
             time(solve.running_s),
             printable(&solve.stage)
         ),
         v1::SolveState::Finished => format!("finished in {}", time(solve.running_s)),
         v1::SolveState::Failed => "failed".to_owned(),
         v1::SolveState::Cancelled => "cancelled".to_owned(),
-        v1::SolveState::Unspecified => "is in a state unknown here".to_owned(),
+        v1::SolveState::Unspecified => "in a state that this version does not know".to_owned(),
     };
     format!("{} ({size}) {state}", printable(&solve.solve_id))
 }
@@ -212,7 +215,10 @@ mod tests {
             solves,
             ..v1::StatusResponse::default()
         });
-        assert!(text.contains("20 that have ended, and these:"), "{text}");
+        assert!(
+            text.contains("20 older ones that have ended, and these:"),
+            "{text}"
+        );
         for (id, shown) in [
             ("id000", true),
             ("id020", false),

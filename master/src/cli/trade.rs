@@ -25,12 +25,12 @@ use super::console::{self, Notes};
 use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
 
-/// Try settings of `solve` on a scene, and say which is the fastest for an error
+/// Try settings of `solve` on a scene, and say which is the fastest for each target error
 ///
 /// A reference is computed first, then every setting with several seeds; this takes many times as long as a
-/// solve. DIR gets trade.html to look at, trade.csv, and trade.jsonl, in which all that was computed is kept: a
-/// study that was stopped goes on where it ended. Accuracy and diameter in a scene file do not count.
-/// The choice for each error goes to stdout.
+/// solve. Writes trade.html (the page to look at), trade.csv and trade.jsonl into DIR; trade.jsonl keeps every
+/// run, so that a study that was stopped continues where it ended. Accuracy and diameter in a scene file are
+/// ignored. The choice for each target error goes to stdout.
 #[derive(Debug, Args)]
 pub(crate) struct TradeArgs {
     #[command(flatten)]
@@ -43,18 +43,18 @@ pub(crate) struct TradeArgs {
 #[derive(Debug, Args)]
 #[command(next_help_heading = "How to study it")]
 struct HowFlags {
-    /// Folder for the study; made if there is none
+    /// Folder for the study; created if it does not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
-    /// Runs of each setting, each with its own seed, at least 2: their scatter is in the error bars
+    /// Runs of each setting, at least 2, each with its own seed: their scatter is part of the error bars
     #[arg(long, value_name = "N", default_value_t = 3)]
     #[arg(value_parser = whole::<u32>(2..=1000), allow_negative_numbers = true)]
     seeds: u32,
 
-    /// Smallest error that a setting is wanted for, percent: rms over organs, relative to the mean
+    /// Smallest target error, percent: rms over organs, relative to the mean
     ///
-    /// The reference is planned for half of it, and a built-in sky has directions of its own in each run.
+    /// The reference is planned for half of it, and a built-in sky has other directions in each run.
     #[arg(long, value_name = "PERCENT", default_value_t = 0.2)]
     #[arg(value_parser = positive, allow_negative_numbers = true)]
     finest: f64,
@@ -63,7 +63,7 @@ struct HowFlags {
     #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
     memory: Option<f64>,
 
-    /// Threads to compute with, 0 for one per processor [default: 0]
+    /// Number of threads, 0 for one per processor [default: 0]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=4096), allow_negative_numbers = true)]
     threads: Option<usize>,
 
@@ -71,7 +71,7 @@ struct HowFlags {
     #[arg(long, value_name = "N", value_parser = whole::<u64>(0..=u64::MAX), allow_negative_numbers = true)]
     seed: Option<u64>,
 
-    /// Say nothing but errors: no progress, no table
+    /// Print errors only: no progress, no table
     #[arg(long, short)]
     quiet: bool,
 }

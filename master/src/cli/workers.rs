@@ -14,23 +14,24 @@ use super::console::Notes;
 use super::numbers::whole;
 
 #[derive(Debug, Args)]
-#[command(next_help_heading = "Who computes it")]
+#[command(next_help_heading = "Workers")]
 pub(crate) struct WorkersFlags {
-    /// Start so many worker processes on this machine; they share the threads and, besides what this
-    /// process takes, the memory
+    /// Number of worker processes to start on this machine; they share --threads, and the part of --memory that
+    /// this process does not need
     #[arg(long, value_name = "N", conflicts_with = "listen",
           value_parser = whole::<u32>(1..=1024), allow_negative_numbers = true)]
     workers: Option<u32>,
 
-    /// Let workers join this solve: `nestrad-worker --master http://ADDRESS`, any number at any time
+    /// Address where workers can join this solve, any number at any time: `nestrad-worker --master
+    /// http://ADDRESS:PORT`
     #[arg(long, value_name = "ADDRESS:PORT")]
     listen: Option<SocketAddr>,
 
-    /// A worker that is silent for so long loses its jobs to others, seconds
+    /// After this many seconds of silence, the jobs of a worker go to others
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
 
-    /// Without any worker for so long, this process computes by itself, seconds
+    /// After this many seconds without any worker, this process computes by itself
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
     patience: Duration,
 

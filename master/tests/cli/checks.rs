@@ -39,8 +39,8 @@ fn fault_check_asked_for_optics() {
     let ran = desk.done(&["check", "plants.can"]);
     for fact in [
         "triangles 4 in 3 organs",
-        "band      none is given, which solve needs",
-        "light     none is given, which solve needs",
+        "band      none is given; solve needs one",
+        "light     none is given; solve needs it",
     ] {
         assert!(ran.stdout.contains(fact), "{fact}: {}", ran.stdout);
     }
@@ -89,7 +89,7 @@ fn the_sun_is_said_in_degrees() {
         .replace("light = \"day.light\"\n", "");
     desk.put("clear.toml", format!("{scene}{sky}"));
     let sun =
-        "60.29 degrees above the horizon, azimuth 124.09 degrees from north (y) over east (x)";
+        "60.29 degrees above the horizon, azimuth 124.09 degrees from north (y) through east (x)";
     let ran = desk.done(&["check", "clear.toml"]);
     assert!(
         ran.stdout.contains(&format!("sun       {sun}\n")),

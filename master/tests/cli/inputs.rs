@@ -163,8 +163,8 @@ fn results_and_report_of_a_canopy_with_y_up_are_those_with_z_up() {
 fn an_absurd_beam_is_solved_with_a_warning() {
     let desk = Desk::new();
     desk.put("day.light", "60 1 0 -0.01\n");
-    let warning = "in band PAR a beam 0.57 degrees above the horizon brings 6000 W m-2 across its direction, the sun \
-                   outside the atmosphere 531 W m-2: is its irradiance right?";
+    let warning = "band PAR: a source 0.57 degrees above the horizon has 6000 W m-2 perpendicular to its direction, more \
+                   than the sun outside the atmosphere (531 W m-2): is its irradiance right?";
     let ran = desk.done(&["check", "scene.toml"]);
     assert!(
         ran.stdout.contains(&format!("warning   {warning}")),

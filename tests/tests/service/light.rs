@@ -25,7 +25,7 @@ fn a_beam_near_the_horizon_is_refused_or_warned_of() {
             refused.message()
         );
         let warnings = told(-0.01).await.unwrap().warnings;
-        let warning = "in band PAR a beam 0.57 degrees above the horizon brings 10000 W m-2";
+        let warning = "band PAR: a source 0.57 degrees above the horizon has 10000 W m-2";
         assert!(
             warnings.iter().any(|w| w.starts_with(warning)),
             "{warnings:?}"

@@ -32,7 +32,7 @@ pub struct Offer {
 #[derive(Debug, Error)]
 pub enum ServingError {
     /// The master does not want it, now or later.
-    #[error("the master turns this worker away: {0}")]
+    #[error("the master refuses this worker: {0}")]
     TurnedAway(String),
     /// There are no threads to compute with.
     #[error("cannot start threads")]

@@ -90,7 +90,7 @@ impl Session {
             // leases that are left go to others at once
             let left = tokio::time::timeout(LEAVING, self.master.leave(self.worker_id)).await;
             if !matches!(left, Ok(Ok(()))) {
-                tracing::warn!("left without the master's knowledge");
+                tracing::warn!("left, but could not tell the master");
             }
         }
         end

@@ -57,7 +57,7 @@ fn fault_organs_of_two_files_with_one_name_became_one() {
     assert_eq!(
         case.refusal(),
         "b.can, line 2: organ 1001 of plant 1 of species 1 is in a.can, line 1 already; \
-         expected every organ in one file: number plants or species through all files"
+         expected each organ in one file only: give plants or species of each file other numbers"
     );
     // one file twice
     let refusal = trees("oak.obj", "p/../oak.obj").refusal();

@@ -142,7 +142,7 @@ fn material(given: &Spanned<MaterialTable>, text: &Text<'_>) -> Result<LeafOptic
             return Err(text.fault(
                 &given.span(),
                 "rho (and tau) of both faces, or upper and lower with rho (and tau) each",
-                "another choice of them",
+                "another combination of these",
             ));
         }
     };
@@ -208,14 +208,14 @@ fn sky(given: SkyTable, span: &Range<usize>, text: &Text<'_>) -> Result<LightInp
             return Err(text.fault(
                 span,
                 "time_utc, latitude_deg, longitude_deg and diffuse_fraction for a clear sky",
-                "not all of them",
+                "only some of them",
             ));
         }
         _ => {
             return Err(text.fault(
                 span,
-                "nothing but irradiance_W_m2 for an overcast sky",
-                "more",
+                "irradiance_W_m2 alone for an overcast sky",
+                "other keys too",
             ));
         }
     };

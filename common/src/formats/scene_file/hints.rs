@@ -28,12 +28,12 @@ fn hint(said: &str, text: &str, at: usize) -> Option<String> {
     if let Some(number) = number(word, line) {
         let (right, wrong) = number;
         return Some(format!(
-            "expected a number as TOML has it, {right}, found {wrong}"
+            "expected a number written as in TOML, {right}, found {wrong}"
         ));
     }
     let lower = word.to_lowercase();
     if (lower == "true" || lower == "false") && lower != word {
-        return Some(format!("expected {lower}, in small letters, found {word}"));
+        return Some(format!("expected {lower}, in lower case, found {word}"));
     }
     if said.contains("must be quoted") && !word.is_empty() {
         return Some(format!("expected text in quotes, \"{word}\", found {word}"));
@@ -47,7 +47,7 @@ fn hint(said: &str, text: &str, at: usize) -> Option<String> {
     let escape = ["unicode value digits", "escape", "unicode"];
     if escape.iter().any(|of| said.contains(of)) && line.contains('\\') {
         return Some(
-            "expected a path with / or in single quotes, found a \\, which has a meaning of its own in \"\""
+            "expected a path with / or in single quotes, found a \\, which begins an escape sequence in double quotes"
                 .to_owned(),
         );
     }

@@ -203,7 +203,7 @@ fn what_is_wrong_is_named_with_its_line() {
         ),
         (
             "[light.sky]\nkind = 'uniform_overcast'\nlatitude_deg = 3\nirradiance_W_m2 = {}\n",
-            "a.toml, line 1: expected nothing but irradiance_W_m2",
+            "a.toml, line 1: expected irradiance_W_m2 alone",
         ),
         (
             "[options]\nthreads = -1\n",
@@ -250,35 +250,35 @@ fn fault_numbers_and_texts_that_toml_has_no_form_for_were_not_explained() {
     for (line, expected) in [
         (
             "soil = .1",
-            "expected a number as TOML has it, 0.1, found .1",
+            "expected a number written as in TOML, 0.1, found .1",
         ),
         (
             "soil = -.5e-3 # m",
-            "expected a number as TOML has it, -0.5e-3, found -.5e-3",
+            "expected a number written as in TOML, -0.5e-3, found -.5e-3",
         ),
         (
             "soil = 1.",
-            "expected a number as TOML has it, 1.0, found 1.",
+            "expected a number written as in TOML, 1.0, found 1.",
         ),
         (
             "soil = +2.e3",
-            "expected a number as TOML has it, +2.0e3, found +2.e3",
+            "expected a number written as in TOML, +2.0e3, found +2.e3",
         ),
         (
             "soil = 01.5",
-            "expected a number as TOML has it, 1.5, found 01.5",
+            "expected a number written as in TOML, 1.5, found 01.5",
         ),
         (
             "soil = 0,5",
-            "expected a number as TOML has it, 0.5, found 0,5",
+            "expected a number written as in TOML, 0.5, found 0,5",
         ),
         (
             "pattern = [0, .5, 1, 1]",
-            "expected a number as TOML has it, 0.5, found .5",
+            "expected a number written as in TOML, 0.5, found .5",
         ),
         (
             "bands = [{ name = 'A', materials = { m = { rho = .1, tau = 0.2 } } }]",
-            "expected a number as TOML has it, 0.1, found .1",
+            "expected a number written as in TOML, 0.1, found .1",
         ),
         ("unit = cm", "expected text in quotes, \"cm\", found cm"),
         (
@@ -287,7 +287,7 @@ fn fault_numbers_and_texts_that_toml_has_no_form_for_were_not_explained() {
         ),
         (
             "options = { vtp = True }",
-            "expected true, in small letters, found True",
+            "expected true, in lower case, found True",
         ),
         (
             "leaf one = 1",
@@ -295,7 +295,7 @@ fn fault_numbers_and_texts_that_toml_has_no_form_for_were_not_explained() {
         ),
         (
             "scene = \"C:\\users\\a.can\"",
-            "expected a path with / or in single quotes, found a \\, which has a meaning of its own in \"\"",
+            "expected a path with / or in single quotes, found a \\, which begins an escape sequence in double quotes",
         ),
         (
             "soil = '0.1'",

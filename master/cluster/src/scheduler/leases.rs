@@ -164,7 +164,7 @@ impl Scheduler {
             lease.until = None;
             let lease = *lease;
             release(&mut self.workers, lease.worker, id);
-            self.failed(&lease, "was not heard of within the lease time");
+            self.failed(&lease, "sent nothing within the lease time");
             if let Some(solve) = self.solves.get_mut(&lease.solve) {
                 solve.returned(lease.job, id);
             }

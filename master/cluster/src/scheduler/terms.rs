@@ -76,7 +76,7 @@ pub struct Leased {
 #[derive(Clone, Copy, Debug, Error, PartialEq, Eq)]
 pub enum Refusal {
     /// It never joined, left, or was silent for too long.
-    #[error("worker {0} is not known: join anew")]
+    #[error("worker {0} is not known: join again")]
     UnknownWorker(Id),
     /// It never had this lease, or is done with it.
     #[error("lease {0} is not known")]

@@ -103,13 +103,13 @@ impl Store {
             Err(FileError::Other(reason)) => {
                 let aside = path.with_extension("corrupt");
                 warned = Some(format!(
-                    "{}: {reason}; it is put aside as {}",
+                    "{}: {reason}; the file is renamed to {}",
                     path.display(),
                     aside.display()
                 ));
                 fs::rename(&path, &aside).map_err(|e| StoreError::File {
                     file: path.clone(),
-                    reason: format!("{reason}; cannot be put aside: {e}"),
+                    reason: format!("{reason}; it cannot be renamed: {e}"),
                 })?;
                 File::open(&path, most_bytes)
             }
@@ -212,7 +212,7 @@ fn write(waiting: &Receiver<Written>, file: &Mutex<Option<File>>, warning: &Mute
         if let Err(reason) = open.put(&results) {
             tell(
                 warning,
-                &format!("results are not kept any more: {reason}; the solve goes on"),
+                &format!("results are no longer kept: {reason}; the solve continues"),
             );
             *file = None;
             return;

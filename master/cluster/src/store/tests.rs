@@ -120,7 +120,7 @@ fn a_file_that_is_no_store_is_put_aside() {
     fs::write(folder.path().join("results.redb"), [7; 9000]).unwrap();
     let store = Store::open(folder.path(), 1 << 20).unwrap();
     let warning = store.warning().unwrap();
-    assert!(warning.contains("put aside"), "{warning}");
+    assert!(warning.contains("the file is renamed to"), "{warning}");
     store.put([1; 32], &rows(10, 1));
     store.close();
     assert_eq!(get(&store, 1), Some(rows(10, 1)));

@@ -98,8 +98,8 @@ pub enum ExchangeError {
     Packed(#[from] PackedFault),
     /// No cut of the scene into blocks is small enough for a worker.
     #[error(
-        "a worker needs {needed_GiB:.2} GiB for the smallest block of this scene, the smallest has \
-         {limit_GiB:.2}: give workers more memory{}", if *.bounded { "" } else { " or choose a --diameter" }
+        "a worker needs {needed_GiB:.2} GiB for the smallest block of this scene, but the smallest worker has \
+         {limit_GiB:.2} GiB: give workers more memory{}", if *.bounded { "" } else { " or choose a --diameter" }
     )]
     BlockTooLarge {
         /// What the smallest block that was tried takes.

@@ -44,7 +44,7 @@ pub enum LayersFault {
     /// Area per m² of ground is not defined, or beyond all bounds.
     #[error(
         "a scene without a pattern needs an extent in both x and y for a far field; \
-         give it a pattern or use an infinite sphere diameter"
+         give it a pattern or use --diameter inf"
     )]
     NoGround,
 }

@@ -175,7 +175,7 @@ impl TracePlan {
 pub enum PlanError {
     /// It does not fit.
     #[error(
-        "the solve needs about {:.2} GiB (scene {:.2}, rows {:.2}, solver {:.2}), the limit is {} GiB: raise --memory or --accuracy",
+        "the solve needs about {:.2} GiB (scene {:.2}, rows {:.2}, solver {:.2}), the limit is {} GiB: allow more with --memory, or a larger error with --accuracy",
         .needed.total_GiB(), .needed.scene_GiB, .needed.rows_GiB, .needed.solver_GiB, Short(*.limit_GiB)
     )]
     Memory {
@@ -194,7 +194,7 @@ pub enum PlanError {
     },
     /// A triangle that covers its own copies.
     #[error(
-        "triangle {triangle} (from 0) reaches over {patterns:.1e} copies of the pattern, expected at most {most:.0e}: is the unit right?"
+        "triangle {triangle} (counted from 0) extends over {patterns:.1e} copies of the pattern, expected at most {most:.0e}: is the unit right?"
     )]
     Overhang {
         /// Its number.
@@ -218,7 +218,7 @@ pub enum PlanError {
     },
     /// Leaves that cannot be told apart in height.
     #[error(
-        "the scene, soil included, is {height_m:.3e} m high, which resolves heights to {step_m:.1e} m only, against triangles of {triangle_m:.1e} m: is the height of the soil right?"
+        "the scene, soil included, is {height_m:.3e} m high, so heights are exact to {step_m:.1e} m only, but a triangle is {triangle_m:.1e} m wide: is the height of the soil right?"
     )]
     Height {
         /// From the lowest to the highest point.
@@ -230,7 +230,7 @@ pub enum PlanError {
     },
     /// More elements than can be numbered.
     #[error(
-        "triangles would be cut into {found} elements, expected at most {most}: raise --diameter or --accuracy"
+        "triangles would be cut into {found} elements, expected at most {most}: choose a larger --diameter, or allow a larger error with --accuracy"
     )]
     Elements {
         /// How many there would be.

@@ -32,7 +32,9 @@ fn light(lit: &LitCanopy, plan: &Plan) -> String {
     match lit.sources.list.len() {
         0 => "light: none, so nothing is lit".to_owned(),
         n => {
-            format!("light: {n} parallel sources, projected at {pitch_mm:.2} mm for the strongest")
+            format!(
+                "light: {n} parallel sources; direct light is sampled every {pitch_mm:.2} mm for the strongest"
+            )
         }
     }
 }
@@ -73,13 +75,13 @@ fn exchange(settings: &Settings, plan: &Plan) -> String {
     };
     match settings.estimator {
         Estimator::Lines => format!(
-            "exchange: {} directions of lines {:.1} mm apart, for an accuracy of {} %",
+            "exchange: {} directions of lines {:.1} mm apart, planned for an error of {} %",
             s.batches * s.sets_per_batch * s.axes.count(),
             1e3 * s.line_area_m2.sqrt(),
             (1e3 * plan.aims.exchange_percent).round() / 1e3
         ),
         Estimator::Rays => format!(
-            "exchange: {} rays from every face, as asked",
+            "exchange: {} rays from every face (--estimator rays)",
             2.0 * s.least_samples
         ),
     }
@@ -88,7 +90,7 @@ fn exchange(settings: &Settings, plan: &Plan) -> String {
 fn field(canopy: &Canopy, settings: &Settings, plan: &Plan) -> String {
     match (plan.trace.radius_m, plan.trace.far_field, settings.diameter) {
         (Some(r), Some(f), _) => format!(
-            "near field: within {r} m; beyond it {} levels x {} bins per hemisphere, closed on the solution",
+            "near field: within {r} m; far field beyond it: {} levels x {} bins per hemisphere, updated with the solution",
             f.levels, f.bins
         ),
         (_, _, Diameter::Metres(_))
@@ -103,7 +105,8 @@ fn field(canopy: &Canopy, settings: &Settings, plan: &Plan) -> String {
             )
         }
         _ if plan.trace.sampling.is_some() => {
-            "near field: full; no far field, because the rows fit the memory".to_owned()
+            "near field: full; no far field, because the rows of the exchange fit the memory"
+                .to_owned()
         }
         _ => "near field: none; far field: none".to_owned(),
     }
@@ -117,7 +120,7 @@ fn faces(canopy: &Canopy) -> String {
         .filter(|&solid| solid)
         .count();
     format!(
-        "faces: two for each of {} triangles; {solid} of them enclose something solid, where leaves that stick in it are dark",
+        "faces: two for each of {} triangles; {solid} of them enclose solids, and parts of leaves inside a solid are dark",
         canopy.len()
     )
 }
@@ -133,7 +136,7 @@ fn soil(canopy: &Canopy, plan: &Plan) -> String {
             "a plane in cells of about {:.1} cm",
             100.0 * plan.trace.soil_cell_m
         ),
-        None => "no plane: black below".to_owned(),
+        None => "no plane: light escapes downwards".to_owned(),
     };
     format!("soil: {plane}; {triangles} triangles")
 }

@@ -4,15 +4,15 @@
 //! where that costs little beside it or where time is short. Where its own errors say that it missed, the next is
 //! planned by what the last one measured (`next.rs`).
 
+mod accuracy;
 mod next;
 mod work;
 
-use std::fmt;
 use std::time::Instant;
 
 use nestrad_common::light::Sources;
 use nestrad_common::scene::Scene;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 use thiserror::Error;
 
 use crate::causes::causes;
@@ -23,6 +23,8 @@ use crate::run::Run;
 use crate::solution::{BandAccount, Solution};
 use crate::stopwatch::Stopwatch;
 use crate::traced::{self, SolveError, WorkDone};
+use accuracy::worst;
+pub use accuracy::{Accuracy, Ended, Round};
 use next::Measured;
 use work::work_s;
 
@@ -54,92 +56,6 @@ impl Solved {
             plan: &self.plan,
             accuracy: &self.accuracy,
         }
-    }
-}
-
-/// What was asked for, and what came of it.
-#[derive(Clone, Debug, PartialEq, Deserialize, Serialize)]
-pub struct Accuracy {
-    /// Error that was asked for: of the worst band, rms over organs, percent of the mean.
-    pub asked_percent: f64,
-    /// Why there was no further round.
-    pub ended: Ended,
-    /// All rounds.
-    pub rounds: Vec<Round>,
-    /// What the error of the last one comes from, by band.
-    pub errors: Vec<BandAccount>,
-    /// Why a finer round failed, where one did.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub failure: Option<String>,
-}
-
-/// A round.
-#[derive(Clone, Copy, Debug, PartialEq, Deserialize, Serialize)]
-pub struct Round {
-    /// What its parts were planned for.
-    pub planned: Aims,
-    /// Error of its worst band, by its own account; none where nothing is absorbed.
-    pub reached_percent: Option<f64>,
-}
-
-/// Why there was no further round.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Ended {
-    /// The error is what was asked for, or less.
-    Reached,
-    /// A finer one would have taken longer than allowed.
-    OutOfTime,
-    /// A finer one would have taken more memory, or more lines, than there may be.
-    BeyondLimits,
-    /// There have been enough.
-    OutOfRounds,
-    /// What is left cannot be planned for: the mean field beyond the sphere, the directions of a sky that were
-    /// given, or what is as fine as it gets.
-    NoFiner,
-    /// A finer one failed.
-    Failed,
-    /// No accuracy was asked for: what the default comes to has to do.
-    NotAsked,
-}
-
-impl fmt::Display for Accuracy {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Some(parts) = worst(&self.errors) else {
-            return f.write_str("nothing is absorbed, so there is no error");
-        };
-        let failed;
-        let why = match self.ended {
-            Ended::Reached => "",
-            Ended::OutOfTime => ", because the time allowed is up",
-            Ended::BeyondLimits => ", because finer plans are beyond the limits",
-            Ended::OutOfRounds => ", however fine it was planned",
-            Ended::NoFiner => ", because no finer plan would help",
-            Ended::Failed => {
-                let cause = self.failure.as_deref().unwrap_or("no reason known");
-                failed = format!(", because a finer round failed: {cause}");
-                &failed
-            }
-            Ended::NotAsked => ", which is no more than the default: --accuracy sees to it",
-        };
-        write!(
-            f,
-            "{:.2} % reached in {}, aimed at {} %{why}; from",
-            parts.total_percent(),
-            parts.band,
-            self.asked_percent,
-        )?;
-        let (mut comma, largest) = ("", parts.largest());
-        for (percent, name) in parts.named().into_iter().filter(|part| part.0 > 0.0) {
-            let most = if name == largest {
-                " (the largest)"
-            } else {
-                ""
-            };
-            write!(f, "{comma} {name} {percent:.2}{most}")?;
-            comma = ",";
-        }
-        f.write_str(" %")
     }
 }
 
@@ -352,26 +268,4 @@ fn following(
         None => finer,
     };
     Ok(measured.aims(&finer))
-}
-
-/// The band with the largest error.
-fn worst(errors: &[BandAccount]) -> Option<&BandAccount> {
-    let by_total =
-        |a: &&BandAccount, b: &&BandAccount| a.total_percent().total_cmp(&b.total_percent());
-    errors.iter().max_by(by_total)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_band_with_the_largest_error_counts() {
-        let of = |exchange_percent| BandAccount {
-            exchange_percent,
-            ..BandAccount::default()
-        };
-        assert_eq!(worst(&[of(0.1), of(0.3)]), Some(&of(0.3)));
-        assert_eq!(worst(&[]), None);
-    }
 }

@@ -27,7 +27,7 @@ pub struct Tolerance {
 pub enum SolverError {
     /// The tolerance was not reached.
     #[error(
-        "the exchange did not converge in {passes} passes: band {band} may still change by {left:.3e} of its incoming power, expected {wanted:.1e}"
+        "the exchange did not converge in {passes} passes: band {band} may still change by {left:.3e} of its incoming power, expected at most {wanted:.1e}"
     )]
     NotConverged {
         /// Name of the band.

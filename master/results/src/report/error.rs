@@ -66,11 +66,11 @@ pub enum ReportError {
         found: String,
     },
     /// The canopy cannot be read again.
-    #[error("the canopy cannot be read again; --scene FILE says where it is now")]
+    #[error("the files of the canopy cannot be read; give their new place with --scene FILE")]
     Scene(#[source] LoadError),
     /// The canopy is not the one that was solved.
     #[error(
-        "{scene}: not the canopy that {} was solved for: {what}; --scene FILE names another",
+        "{scene}: not the canopy of the results in {}: {what}; give the right files with --scene FILE",
         out.display()
     )]
     OtherScene {
@@ -82,7 +82,7 @@ pub enum ReportError {
         what: String,
     },
     /// A picture was asked for in a band that there is not.
-    #[error("{}: expected a band of {bands}, found {found}", out.display())]
+    #[error("{}: expected one of the bands {bands}, found {found}", out.display())]
     Band {
         /// Folder of results.
         out: PathBuf,

@@ -30,7 +30,7 @@ function recolour() {
   const most = soil.reduce((a, b) => Math.max(a, b), 0);
   const ticks = TICKS.map((part) => `<span>${tickText(part, scale, how)}</span>`);
   const each = state.by === 'triangle' ? '' : ', mean of an organ';
-  const note = { log: 'logarithmic', linear: 'linear', quantiles: 'equal leaf areas have equal parts of the scale' }[how];
+  const note = { log: 'logarithmic', linear: 'linear', quantiles: 'each colour has an equal leaf area' }[how];
   element('scale').innerHTML = `<div class="ramp"><div style="background:linear-gradient(to right,${COLOURS.join(',')})"></div>` +
     `<p>${ticks.join('')}</p></div><p>W absorbed per m² of leaf in ${html(report.bands[state.band])}${each} <span class="se">(${note})</span>` +
     `${most > 0 ? `<br><span class="se">soil, dark to light: 0 to ${figure(most, 3)} W m⁻² arriving</span>` : ''}</p>`;
@@ -130,7 +130,7 @@ function showBalance() {
   }
   element('balance').innerHTML = table([report.periodic ? 'W per m² of ground' : 'W, whole scene', ...report.balance.map((b) => html(b.band))], rows) +
     ofMaterials(divisor, part) +
-    '<p class="hint">± one standard error. Closure is what is left of incoming light; nothing is scaled to make it close, so it should be within a few of its own standard errors.</p>';
+    '<p class="hint">± one standard error. Closure is incoming light minus absorbed and escaped light. Nothing is scaled to make it zero, so it should be within a few of its own standard errors.</p>';
 }
 
 // What each material absorbs, where there are several.
@@ -144,22 +144,22 @@ function ofMaterials(divisor, part) {
 }
 
 function showErrors() {
-  element('errors').innerHTML = table(['band', 'standard error of an organ', 'closure in its own errors'], report.errors.map((error, k) => {
+  element('errors').innerHTML = table(['band', 'standard error of organs', 'closure in its own standard errors'], report.errors.map((error, k) => {
     const closure = report.balance[k].closure_W;
     const rms = error.rms_percent === null ? '—' : `${fixed(error.rms_percent, 2)} %`;
     return [html(error.band), rms, closure.se > 0 ? fixed(Math.abs(closure.value) / closure.se, 1) : '—'];
-  })) + `<p class="hint">Root mean square over all organs, in percent of the mean absorbed per leaf area; asked for: ${report.accuracy_percent} %. A triangle’s error is larger than its organ’s.</p>` + errorParts();
+  })) + `<p class="hint">Root mean square over all organs, in percent of the mean absorbed per leaf area; target (--accuracy): ${report.accuracy_percent} %. A triangle’s error is larger than its organ’s.</p>` + errorParts();
 }
 
 // what is nothing in all bands is not worth a column
 function errorParts() {
-  const parts = [['exchange', 'exchange_percent'], ['direct light', 'direct_percent'], ['directions of the sky', 'sky_percent'],
-    ['size of elements', 'elements_percent'], ['size of soil cells', 'soil_percent'], ['far field', 'far_field_percent'], ['solver', 'solver_percent']];
+  const parts = [['exchange', 'exchange_percent'], ['direct light', 'direct_percent'], ['sky directions', 'sky_percent'],
+    ['element size', 'elements_percent'], ['soil cell size', 'soil_percent'], ['far field', 'far_field_percent'], ['solver', 'solver_percent']];
   const shown = parts.filter(([, key]) => report.account.some((part) => part[key] >= 0.005));
   if (shown.length === 0) return '';
-  return table(['what it comes from, %', ...shown.map(([name]) => name)],
+  return table(['parts of the error, %', ...shown.map(([name]) => name)],
     report.account.map((part) => [html(part.band), ...shown.map(([, key]) => fixed(part[key], 2))])) +
-    '<p class="hint">The standard error holds the sampling of exchange and direct light; the other parts come on top of it.</p>';
+    '<p class="hint">The standard error includes the sampling of exchange and direct light only. The other parts are not in it.</p>';
 }
 
 function showFacts() {
@@ -167,7 +167,7 @@ function showFacts() {
   const index = report.area_index === null ? '' : ` · area index ${figure(report.area_index, 3)} (one-sided area of leaves and stems, per area of ${groundName}, ${groundSize})`;
   element('facts').textContent = `${plants} plants, ${organs.length} organs, ${triangles.toLocaleString('en')} triangles${index} · ${report.light} (${sources} sources)`;
   element('reasons').innerHTML = report.reasons.map((reason) => `<li>${html(reason)}</li>`).join('');
-  element('cost').textContent = `nestrad ${version}, seed ${seed}; ${figure(resources.wall_s, 3)} s, ${figure(resources.cpu_s, 3)} s of processor time.`;
+  element('cost').textContent = `nestrad ${version}, seed ${seed}; ${figure(resources.wall_s, 3)} s elapsed, ${figure(resources.cpu_s, 3)} s of CPU time.`;
 }
 
 function startView() {

@@ -25,7 +25,7 @@ pub(super) fn draw(comparison: &Comparison) -> String {
     let bottom = ROW * comparison.measured().count() as f64 + 4.0;
     let height = bottom + 40.0;
     let mut svg = format!(
-        "<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"processor time by stage\">\n"
+        "<svg viewBox=\"0 0 {WIDTH} {height}\" role=\"img\" aria-label=\"CPU time by stage\">\n"
     );
     for tick in TICKS {
         let x = LEFT + 0.01 * f64::from(tick) * (RIGHT - LEFT);

@@ -50,13 +50,13 @@ pub enum Missed {
     NothingMeasured,
     /// The best one is within the target, its error bar is not.
     #[error(
-        "the best setting has {:.3} %, but may have {:.3} %: more --seeds would tell",
+        "the best setting has an error of {:.3} %, but it may be up to {:.3} %: more --seeds make this range smaller",
         .0.percent, .0.high_percent
     )]
     NotSure(ErrorRange),
     /// The best one is not within the target.
     #[error(
-        "the best setting has {:.3} % ({:.3} to {:.3} %)",
+        "the best setting has an error of {:.3} % ({:.3} to {:.3} %)",
         .0.percent, .0.low_percent, .0.high_percent
     )]
     NotReached(ErrorRange),

@@ -96,16 +96,16 @@ fn reference(comparison: &Comparison) -> String {
         .zip(&comparison.reference_error_percent);
     let own = bands.map(|(band, error)| format!("{} % in {}", short(*error), escaped(band)));
     format!(
-        "The reference is the mean of runs that err by {} % by their own account; by their scatter it errs by {} itself, which is taken off.",
+        "The reference is the mean of runs whose stated error is {} %. By their scatter, the reference itself has an error of {}; the errors shown here do not include it.",
         short(comparison.reference_percent),
         own.collect::<Vec<_>>().join(", ")
     )
 }
 
 const KINDS: [&str; 3] = [
-    "asked for as an accuracy, D = inf",
-    "within a finite D",
-    "off its plan: no flags ask for it",
+    "chosen by flags, D = inf",
+    "finite D",
+    "changed plan: no flags select it",
 ];
 
 fn kind(row: &Row) -> usize {
@@ -158,10 +158,10 @@ fn band_section(comparison: &Comparison, band: usize) -> String {
     });
     format!(
         "<section>\n<h2>Error over cost: {}</h2>\n{plot}\
-         <p>Each mark is a setting: what it costs, and how much it errs in this band; further left is faster, further \
-         down is better. The broken line joins the Pareto front of this band, the settings that no other beats in \
-         both; numbers are those of the table below. A bar that reaches the lower edge is of an error that \
-         cannot be told from none.</p>\n</section>\n",
+         <p>Each mark is a setting: its CPU time, and its error in this band; further left is faster, further \
+         down is better. The broken line joins the Pareto front of this band, the settings for which no other is \
+         both faster and more accurate; numbers are those of the table below. A bar that reaches the lower edge \
+         means that the error may be zero.</p>\n</section>\n",
         escaped(&comparison.bands[band])
     )
 }
@@ -205,10 +205,10 @@ fn diameters(comparison: &Comparison) -> String {
         lines,
     });
     format!(
-        "<section>\n<h2>Error over D</h2>\n{plot}<p>All marks have the plan that {accuracy} % comes to, and differ in D alone: \
-         within the sphere light is exchanged on the true geometry, beyond it a multilayer model stands in. Without \
-         bounds (inf, at the right) there is no model; what a mark is above that one is about what the model \
-         costs.</p>\n</section>\n"
+        "<section>\n<h2>Error over D</h2>\n{plot}<p>All marks have the plan for {accuracy} %, and differ in D only: \
+         within the sphere light is exchanged on the true geometry, beyond it a multilayer model replaces the geometry. \
+         With D = inf (at the right) there is no model; the height of a mark above that one is about the error \
+         of the model.</p>\n</section>\n"
     )
 }
 
@@ -220,7 +220,7 @@ fn settings(comparison: &Comparison) -> String {
         .collect();
     let mut headings = vec!["number and setting"];
     headings.extend(errors.iter().map(String::as_str));
-    headings.extend(["CPU time, s", "time passed, s", "memory", "rows", "front"]);
+    headings.extend(["CPU time, s", "elapsed time, s", "memory", "rows", "front"]);
     let rows = comparison.measured().map(|(number, row, m)| {
         let mut cells = vec![escaped(&format!("{}: {}", number + 1, row.setting))];
         cells.extend(m.errors.iter().map(|&error| range(error)));

@@ -92,7 +92,7 @@ pub fn carry_out(
     let mut ledger = Ledger::open(&request.out.join("trade.jsonl"))?;
     for line in ledger.unreadable() {
         say(&format!(
-            "trade.jsonl: line {line} is no record, passed over"
+            "trade.jsonl: line {line} is not a record and is ignored"
         ));
     }
     let scene = request.scene;

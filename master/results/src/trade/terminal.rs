@@ -10,7 +10,7 @@ use super::table::{Choice, Comparison, Measured};
 
 /// Headings of the table of choices, here and on the page.
 pub(super) const HEADINGS: [&str; 5] = [
-    "error wanted",
+    "target error",
     "flags of nestrad solve",
     "error of the worst band",
     "CPU time",
@@ -62,7 +62,7 @@ impl Comparison {
         let measured = row.outcome.as_ref().ok()?;
         let (setting, seconds) = (&row.setting, short(measured.cpu_s));
         Some(format!(
-            "{setting} would take {seconds} s, but no flags ask for it"
+            "{setting} would take {seconds} s, but no flags select it"
         ))
     }
 
@@ -114,7 +114,7 @@ mod tests {
         );
         assert_eq!(
             lines[3],
-            "0.5 %: 0.5 %, sets x 0.5 would take 7.00 s, but no flags ask for it"
+            "0.5 %: 0.5 %, sets x 0.5 would take 7.00 s, but no flags select it"
         );
         assert!(
             lines[4].starts_with("0.2 %: the best setting has"),

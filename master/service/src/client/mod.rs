@@ -163,7 +163,7 @@ impl Session {
             if !told {
                 told = true;
                 tell(Event::Note(format!(
-                    "the master is away ({message}): trying again"
+                    "the master cannot be reached ({message}): trying again"
                 )));
             }
             sleep(PAUSE).await;

@@ -214,7 +214,7 @@ impl Held {
 }
 
 fn not_held(what: &str, id: Id) -> ServiceError {
-    let message = format!("{what} {id} is not held (any more): upload it again");
+    let message = format!("the master does not hold {what} {id} (any more): upload it again");
     ServiceError::new(ErrorCode::NotFound, message)
 }
 

@@ -166,7 +166,7 @@ impl Service {
 
     /// Takes on nothing new, and waits for the rest.
     async fn drain(&self, health: &HealthReporter) {
-        tracing::info!("stops: nothing new is taken on");
+        tracing::info!("stopping: the master accepts nothing new");
         health.set_not_serving::<SolveServiceServer<Rpc>>().await;
         let overall = tonic_health::ServingStatus::NotServing;
         health.set_service_status("", overall).await;

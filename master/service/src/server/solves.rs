@@ -258,7 +258,8 @@ impl Solves {
         });
         found.ok_or_else(|| {
             let shown: String = id.chars().take(40).flat_map(char::escape_debug).collect();
-            let message = format!("solve '{shown}' is not known (any more): start it again");
+            let message =
+                format!("the master does not hold solve '{shown}' (any more): start it again");
             ServiceError::new(ErrorCode::NotFound, message)
         })
     }
