@@ -5,14 +5,21 @@
 #![allow(clippy::print_stderr, reason = "the figures are worth reading")]
 
 use std::fs;
+use std::sync::Arc;
 
 use glam::{DVec2, DVec3};
 use nestrad_common::assemble::{load, load_scene_file};
+use nestrad_common::canopy::{Canopy, Mesh, Triangle};
+use nestrad_common::generate::{Bean, LeafAngles, Stand};
 use nestrad_common::optics::LeafOptics;
+use nestrad_common::scene::Scene;
 use nestrad_engine::plan::Settings;
 use nestrad_engine::solution::{ItemLight, Solution};
-use nestrad_tests::canopies::{par_and_nir, scenery as canopy, small_maize, uniform_sky};
+use nestrad_tests::canopies::{
+    par_and_nir, scenery as canopy, small_leaves, small_maize, uniform_sky,
+};
 use nestrad_tests::random::Dice;
+use nestrad_tests::reference::{sample, shared};
 use nestrad_tests::scenery::{Scenery, from_zenith};
 use nestrad_tests::solving::{ESTIMATORS, by, coarse, finish, plan, solve};
 use nestrad_tests::statistics::assert_close;
@@ -116,67 +123,120 @@ fn between_coincident_faces_is_no_light_but_what_passes_through_them() {
     }
 }
 
-/// A third of all organs stand twice, in three ways: organs absorb, both together, what they absorb alone, and lines
-/// and rays agree.
-#[test]
-fn a_canopy_whose_organs_stand_twice_absorbs_what_it_absorbs_alone() {
-    let alone = canopy(&small_maize(), &par_and_nir(), uniform_sky(8, 2));
-    let mut twice = alone.clone();
-    let mut of = 0;
-    for t in 0..alone.triangles.len() {
-        let triangle = alone.triangles[t];
+/// The scene with opaque leaves, and the same with a third of all organs twice, in three ways: nothing passes through, so
+/// what stands twice is the same as what stands once.
+fn once_and_twice(scene: &Scene) -> [Scene; 2] {
+    let mut optics = (*scene.optics).clone();
+    for leaf in optics.bands.iter_mut().flat_map(|band| &mut band.materials) {
+        (leaf.upper.tau, leaf.lower.tau) = (0.0, 0.0);
+        leaf.lower.rho = leaf.upper.rho;
+    }
+    let twins = scene.canopy.triangles().filter_map(|triangle| {
         let how = match triangle.organ % 9 {
             0 => Twin::Same,
             3 => Twin::TurnedOver,
             6 => Twin::AHairAway,
-            _ => continue,
+            _ => return None,
         };
-        let mut other = triangle;
-        other.corners_m = twin(how, triangle.corners_m);
-        twice.triangles.push(other);
-        of += 1;
+        let corners_m = twin(how, triangle.corners_m);
+        Some(Triangle {
+            corners_m,
+            ..triangle
+        })
+    });
+    let mesh: Mesh = scene.canopy.triangles().chain(twins).collect();
+    assert!(5 * (mesh.len() - scene.canopy.len()) > scene.canopy.len());
+    let mut twice = Canopy::of_meshes(vec![mesh]);
+    twice.organs.clone_from(&scene.canopy.organs);
+    twice.materials.clone_from(&scene.canopy.materials);
+    twice.declared.clone_from(&scene.canopy.declared);
+    (twice.pattern, twice.soil_z_m) = (scene.canopy.pattern, scene.canopy.soil_z_m);
+    twice.origin_m = scene.canopy.origin_m;
+    let optics = Arc::new(optics);
+    [scene.canopy.clone(), Arc::new(twice)].map(|canopy| Scene {
+        canopy,
+        optics: optics.clone(),
+        light: scene.light.clone(),
+    })
+}
+
+#[track_caller]
+fn agree(name: &str, a: &Solution, b: &Solution) {
+    let (mut beyond, mut square) = (0, 0.0);
+    for (x, y) in a.organs.iter().zip(&b.organs) {
+        let se = x.absorbed_se_W.hypot(y.absorbed_se_W);
+        let z = (x.absorbed_W - y.absorbed_W) / se.max(f64::MIN_POSITIVE);
+        square += z * z;
+        beyond += usize::from(z.abs() > 3.0);
     }
-    assert!(5 * of > alone.triangles.len());
-    // nothing passes through: what stands twice is then the same as what stands once
-    let opaque = |scenery: &Scenery| {
-        let mut scenery = scenery.clone();
-        for band in &mut scenery.bands {
-            for optics in &mut band.materials {
-                (optics.upper.tau, optics.lower.tau) = (0.0, 0.0);
-                optics.lower.rho = optics.upper.rho;
-            }
-        }
-        scenery.scene()
+    let rms = (square / a.organs.len() as f64).sqrt();
+    eprintln!(
+        "{name}: rms {rms:.2}, {beyond} of {} beyond 3",
+        a.organs.len()
+    );
+    assert!(
+        rms < 1.3 && 50 * beyond <= a.organs.len(),
+        "{name}: {rms}, {beyond}"
+    );
+    for (x, y) in a.balance.iter().zip(&b.balance) {
+        let [x, y] = [x, y].map(|balance| balance.absorbed_plants_W);
+        let se = x.se.hypot(y.se);
+        assert_close(name, y.value, x.value, se, 3.0, 0.01 * x.value);
+    }
+}
+
+/// Organs absorb, both faces together, what they absorb alone, and lines and rays agree.
+#[test]
+fn a_canopy_whose_organs_stand_twice_absorbs_what_it_absorbs_alone() {
+    let bean = Bean {
+        stand: Stand {
+            rows: 1,
+            plants_per_row: 1,
+            row_spacing_m: 0.4,
+            plant_spacing_m: 0.3,
+        },
+        leaf_triangle_m2: 2e-4,
+        seed: 3,
     };
-    let (alone, twice) = (opaque(&alone), opaque(&twice));
-    let bands = alone.optics.len();
-    for estimator in ESTIMATORS {
-        let settings = Settings {
-            estimator,
-            ..coarse()
-        };
-        let [a, b] = [&alone, &twice].map(|scene| solve(scene, &settings).solution);
-        let (mut beyond, mut square) = (0, 0.0);
-        for (x, y) in a.organs.iter().zip(&b.organs) {
-            let se = x.absorbed_se_W.hypot(y.absorbed_se_W);
-            let z = (x.absorbed_W - y.absorbed_W) / se;
-            square += z * z;
-            beyond += usize::from(z.abs() > 3.0);
+    let canopies = [
+        ("maize", small_maize()),
+        ("bean", bean.generate().unwrap()),
+        ("leaves", small_leaves(2.0, LeafAngles::Spherical, 0.01, 4)),
+    ];
+    for (name, generated) in canopies {
+        let scene = canopy(&generated, &par_and_nir(), uniform_sky(8, 2)).scene();
+        let [alone, twice] = once_and_twice(&scene);
+        let solved = ESTIMATORS.map(|estimator| {
+            let settings = Settings {
+                estimator,
+                ..coarse()
+            };
+            let [a, b] = [&alone, &twice].map(|scene| solve(scene, &settings).solution);
+            agree(&format!("{name}, {estimator:?}"), &a, &b);
+            b
+        });
+        let [lines, rays] = &solved;
+        for (l, r) in lines.balance.iter().zip(&rays.balance) {
+            let [l, r] = [l, r].map(|balance| balance.absorbed_plants_W);
+            assert_close(
+                name,
+                l.value,
+                r.value,
+                l.se.hypot(r.se),
+                3.0,
+                0.01 * l.value,
+            );
         }
-        let rms = (square / a.organs.len() as f64).sqrt();
-        eprintln!(
-            "{estimator:?}: rms {rms:.2}, {beyond} of {} beyond 3",
-            a.organs.len()
-        );
-        assert!(
-            rms < 1.3 && 50 * beyond <= a.organs.len(),
-            "{estimator:?}: {rms}, {beyond}"
-        );
-        for k in 0..bands {
-            let [x, y] = [&a, &b].map(|s| &s.balance[k].absorbed_plants_W);
-            let se = x.se.hypot(y.se);
-            assert_close("plants", y.value, x.value, se, 3.0, 0.01 * x.value);
-        }
+    }
+}
+
+#[test]
+fn sample_scenes_whose_organs_stand_twice_absorb_what_they_absorb_alone() {
+    let Some(folder) = shared() else { return };
+    for name in ["maize_rows", "bean_rows", "rice_hills"] {
+        let [alone, twice] = once_and_twice(&sample(&folder, name, -0.002));
+        let [a, b] = [&alone, &twice].map(|scene| solve(scene, &coarse()).solution);
+        agree(name, &a, &b);
     }
 }
 

@@ -156,7 +156,7 @@ impl Lattice {
         Self::with((direction, extent), steps, points, [random[0], random[1]])
     }
 
-    /// A lattice whose steps are up to [`STRETCH`] longer or shorter than those of [`Self::new`], at random, and which
+    /// A lattice whose steps are up to a tenth longer or shorter than those of [`Self::new`], at random, and which
     /// does not fit the box of an open scene: so the edges of panels stand anywhere between its rows, even where they
     /// are as large as the scene. `random` are four numbers in [0, 1): the offset in x and y, and how much it is
     /// stretched along each.
