@@ -33,6 +33,9 @@ pub(crate) fn lower_first(lower: &[DVec3; 3], direction: DVec3) -> bool {
 /// Depths of one place differ by rounding to whole steps, once for each of two faces.
 pub(crate) const CLOSE: u32 = 2;
 
+/// Copies of a triangle that are looked at: of one that is larger than so many patterns, the depth has to do.
+const MOST_COPIES: usize = 64;
+
 /// The faces that the lines of a lattice meet in almost the same place.
 pub(crate) struct Stacks<'a> {
     lattice: &'a Lattice,
@@ -110,18 +113,17 @@ impl<'a> Stacks<'a> {
         let s = corners.map(s_of);
         let (least, greatest) = (s[0].min(s[1]).min(s[2]), s[0].max(s[1]).max(s[2]));
         // of the copies of the triangle, one is met there
-        let met = self.lattice.places_of(line, &corners).map(|at| {
+        let places = self.lattice.places_of((line, depth), &corners);
+        let met = places.take(MOST_COPIES).map(|at| {
             let on_line = self.lattice.point_at(at.x, at.y, corners[0].z);
-            let s_m = s[0] + normal.dot(corners[0] - on_line) / along;
-            if s_m.is_finite() {
-                s_m.clamp(least, greatest)
-            } else {
-                s[0]
-            }
+            s[0] + normal.dot(corners[0] - on_line) / along
         });
+        let met = met.filter(|s_m| s_m.is_finite());
+        let met = met.map(|s_m| s_m.clamp(least, greatest));
         let off = |s_m: &f64| self.lattice.depth(*s_m).abs_diff(depth);
+        let best = met.min_by_key(off).filter(|s_m| off(s_m) <= CLOSE);
         Met {
-            s_m: met.min_by_key(off).unwrap_or(s[0]),
+            s_m: best.unwrap_or_else(|| self.lattice.s_of_depth_m(depth)),
             cosine: along.abs(),
             element,
         }

@@ -239,13 +239,16 @@ impl Lattice {
         )
     }
 
-    /// The places, in lattice coordinates, where a line may meet a triangle: one for each copy of the triangle.
+    /// The places, in lattice coordinates, where a line may meet a triangle at a depth: one for each copy of the triangle
+    /// that is there.
     pub(crate) fn places_of(
         &self,
-        line: usize,
+        (line, depth): (usize, u32),
         triangle: &[DVec3; 3],
     ) -> impl Iterator<Item = DVec2> + use<> {
-        let corners = triangle.map(|p| self.place(p));
+        // a low sun draws triangles out over many patterns, but at one height a triangle is no larger than it is
+        let z_m = self.height_m(depth);
+        let corners = triangle.map(|p| self.place(p.with_z(z_m)));
         let lo = corners[0].min(corners[1]).min(corners[2]);
         let hi = corners[0].max(corners[1]).max(corners[2]);
         let nx = self.nx as usize;
@@ -255,7 +258,7 @@ impl Lattice {
                 return 0..=0;
             }
             let n = f64::from(n);
-            // a vertex is rounded on its way to the lattice
+            // heights are rounded to steps of the depth
             let (first, last) = (
                 ((lo - at) / n - 1e-3).ceil(),
                 ((hi - at) / n + 1e-3).floor(),
@@ -295,6 +298,11 @@ impl Lattice {
         ((s_m - self.s_min_m) * self.s_steps_per_m) as u32
     }
 
+    /// Distance along the line of a depth, metres.
+    pub(crate) fn s_of_depth_m(&self, depth: u32) -> f64 {
+        f64::from(depth) / self.s_steps_per_m + self.s_min_m
+    }
+
     /// Metres along the line between two depths of fragments.
     pub fn distance_m(&self, depth_difference: u32) -> f64 {
         f64::from(depth_difference) / self.s_steps_per_m
@@ -302,7 +310,7 @@ impl Lattice {
 
     /// Height of a depth, metres.
     pub fn height_m(&self, depth: u32) -> f64 {
-        (f64::from(depth) / self.s_steps_per_m + self.s_min_m) * self.direction.z
+        self.s_of_depth_m(depth) * self.direction.z
     }
 
     /// Depth of a height, all along a horizontal plane.
