@@ -3,6 +3,8 @@
 mod kind;
 mod mesh;
 mod solids;
+#[cfg(test)]
+mod solids_tests;
 mod weld;
 
 use std::collections::BTreeMap;

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use flate2::CrcWriter;
 use tempfile::TempDir;
 
-use super::folder::WriteError;
+use super::error::WriteError;
 
 /// Begins the last line; eight hexadecimal digits end it.
 const LAST: &str = "# as nestrad generate wrote it: crc32 ";

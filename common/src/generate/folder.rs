@@ -4,10 +4,9 @@ use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-use thiserror::Error;
-
 use super::canopy::Generated;
 use super::drafts::{Drafts, is_own};
+use super::error::WriteError;
 use crate::light::Sky;
 use crate::light::sky::SkyError;
 
@@ -137,32 +136,6 @@ fn clear_light() -> Result<String, SkyError> {
         text.push_str(&format!("{irradiance} {x} {y} {z}\n"));
     }
     Ok(text)
-}
-
-/// Why a canopy could not be written.
-#[derive(Debug, Error)]
-pub enum WriteError {
-    /// The disk, or the rights to it.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The file or folder that could not be written.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// Something of that name is there that is not as it was generated.
-    #[error(
-        "{}: was not made by nestrad generate, or was changed since; expected --force to overwrite \
-         it, or another --out",
-        path.display()
-    )]
-    Foreign {
-        /// The first such file.
-        path: PathBuf,
-    },
-    /// The light could not be made.
-    #[error(transparent)]
-    Light(#[from] SkyError),
 }
 
 #[cfg(test)]

@@ -32,6 +32,7 @@ pub mod part;
 mod rays;
 pub mod rows;
 pub mod soil;
+mod stacks;
 mod touch;
 pub mod world;
 pub mod zbuffer;

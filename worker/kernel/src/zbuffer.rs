@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use crate::elements::{self, Elements};
 use crate::lattice::{Lattice, Soup, Strips};
-use crate::touch::{CLOSE, Stacks};
+use crate::stacks::{CLOSE, Stacks};
 
 /// The element on top, and the face that it shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

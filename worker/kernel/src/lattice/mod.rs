@@ -209,7 +209,7 @@ impl Lattice {
             offset: DVec2::from(offset) - (lo - shear * extent.min_m.z) * steps_per_m,
             s_min_m: extent.min_m.z / d.z,
             s_steps_per_m: S_STEPS / s_range,
-            touch_m: touch_m(extent),
+            touch_m: touch_m(extent.min_m, extent.max_m),
         }
     }
 

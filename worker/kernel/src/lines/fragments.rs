@@ -9,7 +9,7 @@ use crate::block::Block;
 use crate::elements;
 use crate::lattice::{Lattice, Projected, Strips};
 use crate::part::Part;
-use crate::touch::{CLOSE, Stacks};
+use crate::stacks::{CLOSE, Stacks};
 
 /// Where a line meets the block: depth along the line, local element, and which face it meets.
 ///

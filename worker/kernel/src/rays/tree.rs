@@ -91,7 +91,7 @@ impl Tree {
         }
         let centre = 0.5 * (lo + hi);
         let scale = HALF_EXTENT / (0.5 * (hi - lo)).max_element().max(f64::MIN_POSITIVE);
-        let touch_m = touch_m(extent);
+        let touch_m = touch_m(extent.min_m, extent.max_m);
         let rounding_m = ROUNDING * lo.abs().max(hi.abs()).max_element();
         // and the nodes that obvhs takes as passed
         let padding = HALF_EXTENT * f64::from(f32::EPSILON) * ROUNDINGS + 2.0 * NEAREST_NODE;
