@@ -177,7 +177,8 @@ impl Parts<'_> {
         for (sum, direct_W2) in sinks_W2.iter_mut().zip(&direct.sinks_W2) {
             *sum += direct_W2;
         }
-        if frame.world.extent.periodic {
+        // over soil nothing passes by
+        if frame.world.extent.periodic && frame.world.soil.is_none() {
             sinks_W2[Sink::Down as usize] += direct.caught_W2;
         }
         // of a little more scattered light the same parts leave as of all of it
