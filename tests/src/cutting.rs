@@ -20,7 +20,7 @@ impl RowSource for InBlocks {
             })
         };
         Ok(Work {
-            blocks: self.0.clone(),
+            blocks: self.0.clone().into(),
             jobs: whole.jobs.iter().flat_map(of_batch).collect(),
             ..whole
         })

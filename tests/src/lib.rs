@@ -23,6 +23,7 @@ pub mod extremes;
 pub mod files;
 pub mod form_factor;
 pub mod leaks;
+pub mod lies;
 pub mod processes;
 pub mod proxy;
 pub mod random;

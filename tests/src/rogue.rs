@@ -2,6 +2,7 @@
 
 use std::net::SocketAddr;
 
+use nestrad_kernel::packed::Shape;
 use nestrad_proto::near_field;
 use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
 use nestrad_proto::v1::{
@@ -13,6 +14,7 @@ use tokio::runtime::{Builder, Runtime};
 use tonic::Status;
 use tonic::transport::{Channel, Endpoint};
 
+use crate::lies::Pairs;
 use crate::processes::PATIENCE;
 
 /// A worker that has joined.
@@ -81,8 +83,39 @@ impl Rogue {
         }
     }
 
+    /// Computes jobs until the master wants no more of it: `lie` is told the number of each. Gives how many were taken.
+    pub fn serve(&self, mut lie: impl FnMut(usize, &mut Pairs)) -> usize {
+        let mut taken = 0;
+        loop {
+            let request = LeaseRequest {
+                worker_id: self.id,
+                wait_s: 1.0,
+                held_blocks: Vec::new(),
+            };
+            let leased = self.call(self.client.clone().lease(request));
+            let job = match leased.map(|answer| answer.into_inner().answer) {
+                Ok(Some(lease_response::Answer::Job(job))) => job,
+                Ok(Some(lease_response::Answer::Nothing(_))) => continue,
+                _ => return taken,
+            };
+            let Ok((header, packed)) = self.lie(&job, |pairs| lie(taken, pairs)) else {
+                return taken;
+            };
+            taken += usize::from(self.bring(&header, &packed).unwrap_or(false));
+        }
+    }
+
     /// Computes a job, as it should.
     pub fn compute(&self, job: &LeasedJob) -> (RowsHeader, Vec<u8>) {
+        self.lie(job, |_| ()).unwrap()
+    }
+
+    /// Computes a job, and makes its rows other than they should be.
+    pub fn lie(
+        &self,
+        job: &LeasedJob,
+        lie: impl FnOnce(&mut Pairs),
+    ) -> Result<(RowsHeader, Vec<u8>), Status> {
         let request = FetchBlockRequest {
             worker_id: self.id,
             block_id: job.block_id.clone(),
@@ -101,24 +134,31 @@ impl Rogue {
             }
             Ok(bytes)
         });
-        let message = v1::Block::decode(&bytes.unwrap()[..]).unwrap();
+        let message = v1::Block::decode(&bytes?[..]).unwrap();
         let block = near_field::block(&message).unwrap();
         let tracer = nestrad_kernel::Tracer::new(&block);
         let batch = near_field::batch(job.batch.as_ref().unwrap());
         let rows = nestrad_kernel::trace(&block, || &tracer, &batch).packed(&block);
+        let shape = Shape {
+            rows: block.rows() as u32,
+            ends: block.ends() as u32,
+        };
+        let mut pairs = Pairs::of(&rows.packed, shape);
+        lie(&mut pairs);
+        let (packed, entries) = pairs.packed(shape);
         let header = RowsHeader {
             worker_id: self.id,
             lease_id: job.lease_id,
-            packed_bytes: rows.packed.len() as u64,
-            checksum: blake3::hash(&rows.packed).as_bytes().to_vec(),
-            rows: block.rows() as u32,
-            entries: rows.counts.row_entries,
+            packed_bytes: packed.len() as u64,
+            checksum: blake3::hash(&packed).as_bytes().to_vec(),
+            rows: shape.rows,
+            entries,
             lines: rows.counts.lines,
             segments: rows.counts.segments,
             rays: rows.counts.rays,
             compute_s: 0.1,
         };
-        (header, rows.packed)
+        Ok((header, packed))
     }
 
     /// Returns a result; whether it was of use.

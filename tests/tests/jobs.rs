@@ -2,19 +2,26 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::sync::Arc;
+
 use nestrad_common::generate::{Generated, Maize, Stand};
 use nestrad_common::options::Diameter;
 use nestrad_engine::exchange::{
-    Assembly, BlockOf, Exchange, ExchangeError, JobCounts, JobOf, JobRows, Sampling,
+    Assembly, BlockOf, Exchange, ExchangeError, JobCounts, JobOf, JobRows, Ready, Sampling,
     SmallestWorker, ThisProcess, Work, demand, partition,
 };
 use nestrad_engine::frame::Frame;
 use nestrad_engine::plan::Settings;
+use nestrad_kernel::expected::{OfBlock, RowsFault};
+use nestrad_kernel::job::Batch;
 use nestrad_kernel::part::Part;
-use nestrad_kernel::{Demand, Tracer};
+use nestrad_kernel::rows::Counts;
+use nestrad_kernel::{Demand, PackedRows, Tracer};
 use nestrad_proto::near_field;
 use nestrad_tests::canopies::{par_and_nir, scenery, small_maize, uniform_sky};
-use nestrad_tests::solving::{coarse, frame, plan, trace};
+use nestrad_tests::lies::Pairs;
+use nestrad_tests::random;
+use nestrad_tests::solving::{coarse, frame, plan, trace, try_plan};
 
 /// A canopy in its frame, and a sampling of four batches.
 fn setting(generated: &Generated, diameter: Diameter) -> (Frame, Sampling) {
@@ -45,6 +52,33 @@ fn rows_of_maize() -> Generated {
     .unwrap()
 }
 
+/// A job before it is traced.
+struct Known<'a> {
+    frame: &'a Frame,
+    of: Arc<OfBlock>,
+    block: &'a BlockOf,
+    batch: Batch,
+}
+
+fn known<'a>(frame: &'a Frame, work: &'a Work, job: usize) -> Known<'a> {
+    let block = &work.blocks[work.jobs[job].block];
+    Known {
+        frame,
+        of: Arc::new(OfBlock::new(frame.block(), &block.owned())),
+        block,
+        batch: work.batch(job),
+    }
+}
+
+impl Known<'_> {
+    /// Checks rows as a master does.
+    fn check(&self, rows: &PackedRows) -> Result<(), RowsFault> {
+        let (scene, owned) = (self.frame.block(), self.block.owned());
+        let job = self.of.job(scene, &owned, &self.batch, &rows.counts)?;
+        job.check(&rows.packed)
+    }
+}
+
 /// Computes all jobs from messages, as a worker does, last ones first, and puts them together.
 fn by_jobs(frame: &Frame, work: &Work) -> Exchange {
     let mut assembly = Assembly::new(frame, work);
@@ -59,6 +93,7 @@ fn by_jobs(frame: &Frame, work: &Work) -> Exchange {
         for k in (0..work.jobs.len()).rev().filter(own) {
             let batch = near_field::batch(&near_field::batch_message(&work.batch(k)));
             let rows = nestrad_kernel::trace(&block, || &tracer, &batch).packed(&block);
+            known(frame, work, k).check(&rows).unwrap();
             let rows = JobRows::Packed(rows.into());
             assembly.put(k, rows.clone()).unwrap();
             assembly.put(k, rows).unwrap();
@@ -94,6 +129,134 @@ fn jobs_of_parts_of_lines_and_of_rays_give_the_bits_of_one_job() {
         let cut = by_jobs(&frame, &work);
         assert!(whole.halves == cut.halves, "{diameter}: rows differ");
         assert_eq!(whole.counts, cut.counts);
+    }
+}
+
+/// Blocks of every other triangle and soil cell, each with all that there is around them.
+fn every_other(frame: &Frame) -> Vec<BlockOf> {
+    let triangles = frame.organ.len() as u32;
+    let block = |odd: u32| BlockOf {
+        triangles: (0..triangles).map(|t| (t, t % 2 == odd)).collect(),
+        soil_cells: (0..frame.ends.soil_cells)
+            .filter(|c| c % 2 == odd)
+            .collect(),
+    };
+    vec![block(0), block(1)]
+}
+
+/// Whatever a scene is like, the master never refuses what a right worker brings.
+#[test]
+fn what_is_known_of_a_job_holds_of_all_right_rows() {
+    let tame = (0..40).map(|seed| Ok(random::scenery(seed).scene()));
+    let wild = (0..200).map(|seed| random::wild(seed, seed % 2 == 0));
+    let (mut jobs, mut rays) = (0, 0);
+    for (k, scene) in tame.chain(wild).enumerate() {
+        let Ok(scene) = scene else { continue };
+        let settings = Settings {
+            diameter: [Diameter::Infinite, Diameter::Metres(0.3)][k % 2],
+            accuracy_percent: 20.0,
+            memory_GiB: 0.25,
+            ..Settings::default()
+        };
+        let Ok(plan) = try_plan(&scene, &settings) else {
+            continue;
+        };
+        let frame = frame(&scene.canopy, &plan.trace);
+        let Some(mut sampling) = plan.trace.sampling.filter(|_| frame.rows() < 4000) else {
+            continue;
+        };
+        sampling.line_area_m2 = plan.scale.ground_area_m2 / 60.0;
+        sampling.batches = 2;
+        sampling.least_samples = f64::from(k as u32 % 3) * 10.0;
+        for blocks in [vec![BlockOf::whole(&frame)], every_other(&frame)] {
+            let work = Work::split(&frame, &sampling, blocks);
+            for job in 0..work.jobs.len() {
+                let ready = Ready::of(&work.blocks[work.jobs[job].block], &frame).unwrap();
+                let JobRows::Packed(rows) = ready.rows(&work, job) else {
+                    panic!("jobs are packed");
+                };
+                let checked = known(&frame, &work, job).check(&rows);
+                assert_eq!(checked, Ok(()), "scene {k}, job {job}");
+                jobs += 1;
+                rays += rows.counts.rays;
+            }
+        }
+    }
+    assert!(jobs > 300 && rays > 1000, "{jobs} jobs, {rays} rays");
+}
+
+/// Rows that can be told to be wrong without tracing them again.
+#[test]
+fn rows_that_cannot_be_are_refused() {
+    type Spoil = fn(&mut Pairs);
+    let spoilt: [(&str, Spoil); 6] = [
+        ("twice", |p| p.mutual.extend(p.mutual.clone())),
+        ("without half", |p| {
+            let half = p.mutual.len() / 2;
+            p.mutual.truncate(half);
+        }),
+        ("without one", |p| p.mutual.truncate(p.mutual.len() - 1)),
+        ("seen from one side", |p| {
+            let (row, other) = p.mutual.swap_remove(7);
+            p.single.extend([(row, other), (other, row)]);
+        }),
+        ("at the other face", |p| p.single[5].0 ^= 1),
+        ("nothing", |p| *p = Pairs::default()),
+    ];
+    let (frame, sampling) = setting(&small_maize(), Diameter::Infinite);
+    for blocks in [vec![BlockOf::whole(&frame)], every_other(&frame)] {
+        let work = Work::split(&frame, &sampling, blocks);
+        let ready = Ready::of(&work.blocks[0], &frame).unwrap();
+        let JobRows::Packed(rows) = ready.rows(&work, 0) else {
+            panic!("jobs are packed");
+        };
+        let known = known(&frame, &work, 0);
+        for (what, spoil) in spoilt {
+            let mut pairs = Pairs::of(&rows.packed, known.of.shape());
+            spoil(&mut pairs);
+            let (packed, row_entries) = pairs.packed(known.of.shape());
+            // its worker says what there is
+            let counts = Counts {
+                row_entries,
+                ..rows.counts
+            };
+            let fault = known.check(&PackedRows { packed, counts });
+            assert!(fault.is_err(), "{what}");
+        }
+        for (what, counts) in [
+            (
+                "lines",
+                Counts {
+                    lines: 7,
+                    ..rows.counts
+                },
+            ),
+            (
+                "rays",
+                Counts {
+                    rays: 1,
+                    ..rows.counts
+                },
+            ),
+            (
+                "segments",
+                Counts {
+                    segments: 7,
+                    ..rows.counts
+                },
+            ),
+            (
+                "entries",
+                Counts {
+                    row_entries: 1 << 40,
+                    ..rows.counts
+                },
+            ),
+        ] {
+            let packed = rows.packed.clone();
+            let fault = known.check(&PackedRows { packed, counts });
+            assert!(fault.is_err(), "{what}");
+        }
     }
 }
 

@@ -1,9 +1,12 @@
 //! Blocks as they are sent.
 
+use std::sync::Arc;
+
 use bytes::Bytes;
 use nestrad_engine::exchange::{BlockOf, ExchangeError, Sampling, demand};
 use nestrad_engine::frame::Frame;
 use nestrad_kernel::Demand;
+use nestrad_kernel::expected::OfBlock;
 use nestrad_proto::near_field::block_message;
 use prost::Message;
 
@@ -14,7 +17,8 @@ pub(crate) struct SentBlock {
     pub(crate) id: BlockId,
     /// The encoded message.
     pub(crate) bytes: Bytes,
-    pub(crate) rows: u32,
+    /// What its rows must be like.
+    pub(crate) known: Arc<OfBlock>,
     pub(crate) demand: Demand,
 }
 
@@ -29,7 +33,7 @@ impl SentBlock {
         Ok(Self {
             id: *blake3::hash(&bytes).as_bytes(),
             bytes: bytes.into(),
-            rows: demand.rows as u32,
+            known: Arc::new(OfBlock::new(frame.block(), &block.owned())),
             demand,
         })
     }

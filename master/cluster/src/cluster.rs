@@ -8,7 +8,8 @@ use std::sync::mpsc::Sender;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, Weak};
 use std::time::{Duration, Instant};
 
-use nestrad_engine::exchange::JobRows;
+use nestrad_engine::exchange::{BlockOf, JobRows};
+use nestrad_kernel::Block;
 use nestrad_proto::v1;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use tokio::sync::{Notify, Semaphore};
@@ -30,6 +31,8 @@ pub struct WorkerLimits {
     pub workers: usize,
     /// Without any worker for so long, the master computes by itself.
     pub patience: Duration,
+    /// The share of the workers' jobs that the master computes again, 0 to 1.
+    pub audit: f64,
 }
 
 impl Default for WorkerLimits {
@@ -41,6 +44,7 @@ impl Default for WorkerLimits {
             result_bytes: 1 << 30,
             workers: 4096,
             patience: Duration::from_secs(60),
+            audit: 0.01,
         }
     }
 }
@@ -74,6 +78,8 @@ pub(crate) struct Shared {
     /// Where rows are checked and joined.
     pub(crate) compute: ThreadPool,
     pub(crate) totals: Totals,
+    /// Chooses what workers must not foretell.
+    pub(crate) key: RandomState,
 }
 
 pub(crate) struct ClusterState {
@@ -85,6 +91,8 @@ pub(crate) struct ClusterState {
     pub(crate) closed: bool,
     /// Why nothing can be computed any more.
     pub(crate) failed: Option<String>,
+    /// Workers that returned wrong rows.
+    pub(crate) refused: Vec<Arc<str>>,
 }
 
 /// A solve at which workers work.
@@ -92,9 +100,23 @@ pub(crate) struct Open {
     pub(crate) blocks: Vec<SentBlock>,
     /// What the kernel is asked for each job.
     pub(crate) batches: Vec<v1::Batch>,
-    /// Number of ends of its world.
-    pub(crate) ends: u32,
-    pub(crate) results: Sender<(usize, JobRows)>,
+    /// What each job is expected to take, seconds.
+    pub(crate) costs_s: Vec<f64>,
+    /// The whole scene, and what of it each block holds.
+    pub(crate) scene: Block,
+    pub(crate) parts: Arc<[BlockOf]>,
+    /// Rows that are right as far as can be seen, and workers whose rows are not.
+    pub(crate) results: Sender<Result<Brought, Arc<str>>>,
+}
+
+/// Rows that a worker brought.
+pub(crate) struct Brought {
+    pub(crate) job: usize,
+    pub(crate) rows: JobRows,
+    /// Who brought them.
+    pub(crate) worker: Arc<str>,
+    /// BLAKE3 of the packed rows.
+    pub(crate) checksum: [u8; 32],
 }
 
 /// What has been done since the start.
@@ -106,6 +128,7 @@ pub(crate) struct Totals {
     pub(crate) refused: AtomicU64,
     pub(crate) segments: AtomicU64,
     pub(crate) rays: AtomicU64,
+    pub(crate) audited: AtomicU64,
 }
 
 /// The state of a cluster at one moment.
@@ -131,6 +154,10 @@ pub struct ClusterStatus {
     pub segments: u64,
     /// See `segments`.
     pub rays: u64,
+    /// Jobs of workers that the master computed again.
+    pub audited: u64,
+    /// Workers that returned wrong rows, and are refused.
+    pub untrusted: Vec<Arc<str>>,
 }
 
 impl ClusterStatus {
@@ -164,6 +191,7 @@ impl Cluster {
                 draining: false,
                 closed: false,
                 failed: None,
+                refused: Vec::new(),
             }),
             changed: Notify::new(),
             joined: Condvar::new(),
@@ -171,6 +199,7 @@ impl Cluster {
             room: Semaphore::new(kibibytes(u64::from(limits.result_bytes)) as usize),
             compute,
             totals: Totals::default(),
+            key: RandomState::new(),
             limits,
         });
         tokio::spawn(watch(Arc::downgrade(&shared)));
@@ -221,7 +250,24 @@ impl Cluster {
             lost: state.scheduler.lost(),
             segments: of(&totals.segments),
             rays: of(&totals.rays),
+            audited: of(&totals.audited),
+            untrusted: state.refused.clone(),
         }
+    }
+
+    /// A worker returned wrong rows: from now on it is turned away.
+    pub(crate) fn refuse(&self, worker: &Arc<str>) {
+        tracing::error!(%worker, "returned wrong rows and is refused from now on; all rows of this solve are computed anew");
+        let mut state = self.lock();
+        state.scheduler.dismiss(worker);
+        if !state.refused.contains(worker) {
+            if state.refused.len() >= MOST_REFUSED {
+                state.refused.remove(0);
+            }
+            state.refused.push(worker.clone());
+        }
+        drop(state);
+        self.0.changed.notify_waiters();
     }
 
     pub(crate) fn now(&self) -> Time {
@@ -233,6 +279,9 @@ impl Cluster {
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 }
+
+/// Workers that are remembered as refused: the last ones.
+const MOST_REFUSED: usize = 4096;
 
 /// How often it is looked whether leases are overdue, or jobs take too long.
 const TICK: Duration = Duration::from_millis(100);

@@ -1,11 +1,14 @@
 //! Rows that are kept from earlier solves, before those of another source.
 
+use std::sync::Arc;
+
 use nestrad_engine::exchange::{
     BlockOf, ExchangeError, JobCounts, JobRows, RowSource, Sampling, Take, Work,
 };
 use nestrad_engine::frame::Frame;
 use nestrad_engine::run::Run;
-use nestrad_kernel::packed::Shape;
+use nestrad_kernel::PackedRows;
+use nestrad_kernel::expected::OfBlock;
 use nestrad_proto::near_field::batch_message;
 use prost::Message;
 
@@ -54,15 +57,22 @@ impl RowSource for Kept<'_> {
         take: &mut Take<'_>,
         run: &Run,
     ) -> Result<JobCounts, ExchangeError> {
-        let rows: Vec<u32> = work.blocks.iter().map(|b| b.count_rows(frame)).collect();
+        let blocks = work.blocks.iter();
+        let known: Vec<Arc<OfBlock>> = blocks
+            .map(|block| Arc::new(OfBlock::new(frame.block(), &block.owned())))
+            .collect();
         let mut missing = Vec::new();
         for &job in wanted {
             run.stop.check()?;
-            let shape = Shape {
-                rows: rows[work.jobs[job].block],
-                ends: frame.ends.len() as u32,
+            let block = work.jobs[job].block;
+            let is_right = |rows: &PackedRows| {
+                let (scene, owned) = (frame.block(), work.blocks[block].owned());
+                let expected = known[block].job(scene, &owned, &work.batch(job), &rows.counts);
+                expected
+                    .and_then(|expected| expected.check(&rows.packed))
+                    .is_ok()
             };
-            match self.store.get(&work.names[job], shape) {
+            match self.store.get(&work.names[job]).filter(is_right) {
                 Some(rows) => take(job, JobRows::Packed(rows.into()))?,
                 None => missing.push(job),
             }
@@ -71,13 +81,26 @@ impl RowSource for Kept<'_> {
         if missing.is_empty() {
             return Ok(JobCounts { traced: 0, kept });
         }
+        let mut not_audited = Vec::new();
         let mut keep = |job: usize, rows: JobRows| {
             if let JobRows::Packed(packed) = &rows {
-                self.store.put(work.names[job], packed);
+                let origin = self.rows.origin(job);
+                if origin.as_ref().is_some_and(|origin| !origin.audited) {
+                    not_audited.push(job);
+                }
+                self.store.put(work.names[job], packed, origin);
             }
             take(job, rows)
         };
-        let traced = self.rows.trace(frame, work, &missing, &mut keep, run)?;
+        let traced = self.rows.trace(frame, work, &missing, &mut keep, run);
+        if let Err(ExchangeError::Distrusted { worker }) = &traced {
+            self.store.drop_of(worker);
+        }
+        let traced = traced?;
+        let audited = |job: &usize| self.rows.origin(*job).is_some_and(|of| of.audited);
+        for job in not_audited.into_iter().filter(audited) {
+            self.store.audited(work.names[job]);
+        }
         Ok(JobCounts {
             kept: kept + traced.kept,
             ..traced

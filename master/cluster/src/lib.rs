@@ -10,6 +10,7 @@
     reason = "units in names are written as units: memory_GiB"
 )]
 
+mod audits;
 mod blocks;
 mod cluster;
 pub mod door;

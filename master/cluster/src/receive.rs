@@ -1,19 +1,70 @@
 //! Rows on their way in: nothing in them is trusted.
 
+use std::sync::Arc;
 use std::time::Duration;
 
-use nestrad_engine::exchange::JobRows;
-use nestrad_kernel::PackedRows;
-use nestrad_kernel::packed::{self, Shape};
+use nestrad_engine::exchange::{BlockOf, JobRows};
+use nestrad_kernel::cost::LOOKED_NS;
+use nestrad_kernel::expected::{Expected, OfBlock};
+use nestrad_kernel::packed;
 use nestrad_kernel::rows::Counts;
-use nestrad_proto::v1::{ReturnRowsRequest, RowsHeader, return_rows_request};
+use nestrad_kernel::{Block, PackedRows};
+use nestrad_proto::near_field;
+use nestrad_proto::v1::{self, ReturnRowsRequest, RowsHeader, return_rows_request};
 use tonic::{Code, Status, Streaming};
 
 /// What a result has to fit.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Expected {
-    pub(crate) shape: Shape,
+#[derive(Clone)]
+pub(crate) struct Wanted {
+    pub(crate) scene: Block,
+    pub(crate) parts: Arc<[BlockOf]>,
+    /// The block of the job, and what is known of it.
+    pub(crate) block: usize,
+    pub(crate) known: Arc<OfBlock>,
+    pub(crate) batch: v1::Batch,
+    pub(crate) cost_s: f64,
     pub(crate) most_bytes: u64,
+}
+
+/// Rows of lines of a result that are traced again, at most.
+const MOST_LOOKS: u32 = 4;
+
+impl Wanted {
+    /// What holds of the rows, if they can be what their header says.
+    pub(crate) fn job(&self, header: &RowsHeader) -> Result<Expected, Status> {
+        let owned = self.parts[self.block].owned();
+        let batch = near_field::batch(&self.batch);
+        let job = self.known.job(&self.scene, &owned, &batch, &counts(header));
+        job.map_err(|fault| Status::invalid_argument(fault.to_string()))
+    }
+
+    /// Whether what a few of its lines see is in the packed rows of a job. As many as take a share of its time are looked
+    /// at, on average; `number` chooses which.
+    pub(crate) fn is_seen_again(
+        &self,
+        packed: &[u8],
+        share: f64,
+        number: impl Fn(u32) -> u64,
+    ) -> bool {
+        let look_s = 1e-9 * LOOKED_NS * self.scene.soup().len().max(1) as f64;
+        let looks = (share * self.cost_s / look_s).min(f64::from(MOST_LOOKS));
+        let chance = (number(MOST_LOOKS) >> 11) as f64 / (1u64 << 53) as f64;
+        let looks = (looks + chance) as u32;
+        let batch = near_field::batch(&self.batch);
+        (0..looks).all(|k| {
+            let look = self.known.look(&self.scene, &batch, number(k));
+            look.is_in(packed, self.known.shape())
+        })
+    }
+}
+
+fn counts(header: &RowsHeader) -> Counts {
+    Counts {
+        lines: header.lines,
+        segments: header.segments,
+        rays: header.rays,
+        row_entries: header.entries,
+    }
 }
 
 /// No count of lines, segments or rays is larger.
@@ -37,19 +88,20 @@ pub(crate) async fn next(
 }
 
 /// Refuses what a header promises to be too large or not to fit, before any memory is taken.
-pub(crate) fn check_header(header: &RowsHeader, expected: &Expected) -> Result<(), Status> {
+pub(crate) fn check_header(header: &RowsHeader, wanted: &Wanted) -> Result<(), Status> {
+    let expected = wanted.known.shape();
     let fault = |what: &str, found: u64, limit: u64| {
         Err(Status::invalid_argument(format!(
             "result with {found} {what}, expected {limit}"
         )))
     };
-    if header.rows != expected.shape.rows {
-        let rows = u64::from(expected.shape.rows);
+    if header.rows != expected.rows {
+        let rows = u64::from(expected.rows);
         return fault("rows", u64::from(header.rows), rows);
     }
     let (entries, bytes) = (header.entries, header.packed_bytes);
-    if bytes > expected.most_bytes {
-        return fault("bytes", bytes, expected.most_bytes);
+    if bytes > wanted.most_bytes {
+        return fault("bytes", bytes, wanted.most_bytes);
     }
     if entries > packed::most_entries(bytes) || bytes > packed::most_bytes(entries) {
         return fault(
@@ -103,17 +155,12 @@ pub(crate) fn check_body(
     if blake3::hash(&body).as_bytes()[..] != header.checksum[..] {
         return Err(Status::data_loss("result does not match its checksum"));
     }
-    packed::check(&body, expected.shape, header.entries)
+    expected
+        .check(&body)
         .map_err(|fault| Status::invalid_argument(fault.to_string()))?;
-    let counts = Counts {
-        lines: header.lines,
-        segments: header.segments,
-        rays: header.rays,
-        row_entries: header.entries,
-    };
     let rows = PackedRows {
         packed: body,
-        counts,
+        counts: counts(header),
     };
     Ok(JobRows::Packed(rows.into()))
 }

@@ -4,6 +4,7 @@ use nestrad_engine::exchange::{RowSource, ThisProcess};
 
 use crate::cluster::Cluster;
 use crate::kept::Kept;
+use crate::solving::Workers;
 use crate::store::Store;
 
 /// Lends a source of rows: workers where there are any, else this process; before it what a store has.
@@ -13,7 +14,8 @@ pub fn with_rows<T>(
     use_rows: impl FnOnce(&dyn RowSource) -> T,
 ) -> T {
     let here = ThisProcess::default();
-    let traced: &dyn RowSource = match workers {
+    let workers = workers.map(Workers::of);
+    let traced: &dyn RowSource = match &workers {
         Some(workers) => workers,
         None => &here,
     };

@@ -1,23 +1,26 @@
 //! What workers call.
 
+use std::hash::BuildHasher;
+use std::net::IpAddr;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
 use nestrad_engine::exchange::JobRows;
-use nestrad_kernel::packed::Shape;
 use nestrad_proto::MAX_MESSAGE_BYTES;
 use nestrad_proto::v1::worker_service_server::{WorkerService, WorkerServiceServer};
 use nestrad_proto::v1::{
     Drain, FetchBlockRequest, GiveBackRequest, GiveBackResponse, JoinRequest, JoinResponse,
     LeaseRequest, LeaseResponse, LeasedJob, LeaveRequest, LeaveResponse, Nothing, RenewRequest,
-    RenewResponse, ReturnRowsRequest, ReturnRowsResponse, lease_response, return_rows_request,
+    RenewResponse, ReturnRowsRequest, ReturnRowsResponse, RowsHeader, lease_response,
+    return_rows_request,
 };
 use tokio::sync::oneshot;
 use tonic::{Request, Response, Status, Streaming};
 
-use crate::cluster::{Cluster, ClusterState, kibibytes};
-use crate::receive::{self, Expected};
+use crate::cluster::{Brought, Cluster, ClusterState, kibibytes};
+use crate::receive::{self, Wanted};
 use crate::scheduler::{BlockId, Id, Leased, Refusal, WorkerFacts};
 use crate::sending::Sending;
 
@@ -54,8 +57,9 @@ impl From<Refusal> for Status {
 #[tonic::async_trait]
 impl WorkerService for Service {
     async fn join(&self, request: Request<JoinRequest>) -> Result<Response<JoinResponse>, Status> {
+        let seen = Seen::of(&request);
         let asked = request.into_inner();
-        let facts = facts(&asked)?;
+        let facts = facts(&asked, &seen)?;
         let kernel = nestrad_kernel::kernel();
         if asked.kernel != kernel {
             return Err(Status::failed_precondition(format!(
@@ -66,6 +70,10 @@ impl WorkerService for Service {
         let cluster = &self.0;
         let limits = &cluster.0.limits;
         let mut state = cluster.lock();
+        if state.refused.contains(&facts.identity) {
+            let text = format!("worker {} returned wrong rows", facts.identity);
+            return Err(Status::failed_precondition(text));
+        }
         if state.scheduler.facts().count() >= limits.workers {
             let text = format!("expected at most {} workers", limits.workers);
             return Err(Status::resource_exhausted(text));
@@ -249,27 +257,25 @@ impl Cluster {
         };
         let (worker, lease) = (header.worker_id, header.lease_id);
         let wanted = self.wanted(worker, lease)?;
-        let Some(expected) = wanted else {
+        let Some(wanted) = wanted else {
             return Ok(false);
         };
         let taken = async {
-            receive::check_header(&header, &expected)?;
+            receive::check_header(&header, &wanted)?;
+            let (said, of) = (header.clone(), wanted.clone());
+            let expected = self.compute(move || of.job(&said)).await??;
             let room = self.0.room.acquire_many(kibibytes(header.packed_bytes));
             let _room = room.await.map_err(|_| Status::cancelled("master ends"))?;
             let body = receive::body(&mut stream, &header, patience).await?;
             let bytes = body.len() as u64;
             self.0.totals.bytes_in.fetch_add(bytes, Ordering::Relaxed);
-            let (sender, checked) = oneshot::channel();
-            let (cluster, compute_s) = (self.clone(), header.compute_s);
-            self.0.compute.spawn(move || {
-                let rows = receive::check_body(&header, body, &expected);
-                let used = rows.map(|rows| cluster.hand_on(worker, lease, compute_s, rows));
-                // nobody listens where the worker is gone
-                let _ = sender.send(used);
-            });
-            checked
-                .await
-                .map_err(|_| Status::internal("result was not checked"))?
+            let cluster = self.clone();
+            self.compute(move || {
+                let rows = receive::check_body(&header, body, &expected)?;
+                cluster.look_again(&header, &wanted, &rows)?;
+                Ok(cluster.hand_on(&header, rows))
+            })
+            .await?
         };
         let taken: Result<bool, Status> = taken.await;
         if let Err(status) = &taken
@@ -281,44 +287,129 @@ impl Cluster {
         taken
     }
 
-    fn wanted(&self, worker: Id, lease: Id) -> Result<Option<Expected>, Status> {
+    /// Has something computed where rows are checked.
+    async fn compute<T: Send + 'static>(
+        &self,
+        what: impl FnOnce() -> T + Send + 'static,
+    ) -> Result<T, Status> {
+        let (sender, done) = oneshot::channel();
+        self.0.compute.spawn(move || {
+            // nobody listens where the worker is gone
+            let _ = sender.send(what());
+        });
+        let gone = |_| Status::internal("result was not checked");
+        done.await.map_err(gone)
+    }
+
+    /// Traces a few lines again, by chance; a worker that says other than what they see is refused.
+    fn look_again(
+        &self,
+        header: &RowsHeader,
+        wanted: &Wanted,
+        rows: &JobRows,
+    ) -> Result<(), Status> {
+        let JobRows::Packed(packed) = rows else {
+            return Ok(());
+        };
+        let number = |k: u32| self.0.key.hash_one((header.lease_id, k));
+        if wanted.is_seen_again(&packed.packed, self.0.limits.audit, number) {
+            return Ok(());
+        }
+        let mut state = self.lock();
+        let of = state
+            .scheduler
+            .wanted(self.now(), header.worker_id, header.lease_id);
+        let identity = state.scheduler.identity(header.worker_id);
+        if let (Ok(Some(of)), Some(identity)) = (of, identity) {
+            let results = state.solves.get(&of.solve).map(|open| open.results.clone());
+            drop(state);
+            self.refuse(&identity);
+            if let Some(results) = results {
+                // nobody listens where the solve has failed
+                let _ = results.send(Err(identity));
+            }
+        }
+        let text = "result without what its lines see";
+        Err(Status::failed_precondition(text))
+    }
+
+    fn wanted(&self, worker: Id, lease: Id) -> Result<Option<Wanted>, Status> {
         let now = self.now();
         let mut state = self.lock();
         let wanted: Option<Leased> = state.scheduler.wanted(now, worker, lease)?;
         Ok(wanted.and_then(|leased| {
             let open = state.solves.get(&leased.solve)?;
-            Some(Expected {
-                shape: Shape {
-                    rows: open.blocks[leased.block].rows,
-                    ends: open.ends,
-                },
+            Some(Wanted {
+                scene: open.scene.clone(),
+                parts: open.parts.clone(),
+                block: leased.block,
+                known: open.blocks[leased.block].known.clone(),
+                batch: open.batches.get(leased.job)?.clone(),
+                cost_s: *open.costs_s.get(leased.job)?,
                 most_bytes: u64::from(self.0.limits.result_bytes),
             })
         }))
     }
 
     /// Gives a good result to its solve.
-    fn hand_on(&self, worker: Id, lease: Id, compute_s: f64, rows: JobRows) -> bool {
+    fn hand_on(&self, header: &RowsHeader, rows: JobRows) -> bool {
+        let (worker, lease, compute_s) = (header.worker_id, header.lease_id, header.compute_s);
         let now = self.now();
         let totals = &self.0.totals;
         let add = |total: &AtomicU64, more: u64| total.fetch_add(more, Ordering::Relaxed);
         let counts = rows.counts();
         let mut state = self.lock();
         let leased = state.scheduler.finish(now, worker, lease, compute_s);
+        let identity = state.scheduler.identity(worker);
         if let Some(leased) = leased
             && let Some(open) = state.solves.get(&leased.solve)
+            && let Some(worker) = identity
+            && let Ok(checksum) = <[u8; 32]>::try_from(&header.checksum[..])
         {
             add(&totals.results, 1);
             add(&totals.segments, counts.segments);
             add(&totals.rays, counts.rays);
             // nobody listens where the solve has failed
-            let _ = open.results.send((leased.job, rows));
+            let _ = open.results.send(Ok(Brought {
+                job: leased.job,
+                rows,
+                worker,
+                checksum,
+            }));
         }
         leased.is_some()
     }
 }
 
-fn facts(asked: &JoinRequest) -> Result<WorkerFacts, Status> {
+/// What a master sees of a worker by itself.
+struct Seen {
+    address: Option<IpAddr>,
+    /// Digest of its certificate.
+    certificate: Option<String>,
+}
+
+impl Seen {
+    fn of<T>(request: &Request<T>) -> Self {
+        let certificates = request.peer_certs();
+        let own = certificates.as_ref().and_then(|chain| chain.first());
+        Self {
+            address: request.remote_addr().map(|address| address.ip()),
+            certificate: own.map(|own| blake3::hash(own).to_hex()[..16].to_owned()),
+        }
+    }
+
+    /// Who that is: nobody else has its certificate; without one, its address and its name have to do.
+    fn identity(&self, name: &str) -> Arc<str> {
+        let address = self.address.map(|address| address.to_string());
+        match &self.certificate {
+            Some(digest) => format!("with certificate {digest}"),
+            None => format!("{name} at {}", address.as_deref().unwrap_or("?")),
+        }
+        .into()
+    }
+}
+
+fn facts(asked: &JoinRequest, seen: &Seen) -> Result<WorkerFacts, Status> {
     if asked.name.len() > LONGEST_NAME {
         let text = format!("name: expected at most {LONGEST_NAME} bytes");
         return Err(Status::invalid_argument(text));
@@ -327,8 +418,10 @@ fn facts(asked: &JoinRequest) -> Result<WorkerFacts, Status> {
         let text = format!("threads: expected 1 to {MOST_THREADS}");
         return Err(Status::invalid_argument(text));
     }
+    let name = shown(&asked.name, LONGEST_NAME);
     Ok(WorkerFacts {
-        name: shown(&asked.name, LONGEST_NAME),
+        identity: seen.identity(&name),
+        name,
         threads: asked.threads,
         memory_bytes: asked.memory_bytes,
     })

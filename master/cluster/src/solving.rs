@@ -1,12 +1,13 @@
 //! Workers as a source of rows.
 
-use std::sync::PoisonError;
+use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 use nestrad_engine::exchange::{
-    ExchangeError, JobCounts, JobRows, Ready, RowSource, Sampling, SmallestWorker, Take, Work,
-    partition,
+    ExchangeError, JobCounts, JobRows, Origin, Ready, RowSource, Sampling, SmallestWorker, Take,
+    ThisProcess, Work, partition,
 };
 use nestrad_engine::frame::Frame;
 use nestrad_engine::run::Run;
@@ -14,8 +15,9 @@ use nestrad_engine::stop::Stop;
 use nestrad_proto::near_field::batch_message;
 use rayon::prelude::*;
 
+use crate::audits::{Audits, Said};
 use crate::blocks::SentBlock;
-use crate::cluster::{Cluster, ClusterState, Open};
+use crate::cluster::{Brought, Cluster, ClusterState, Open};
 use crate::patience::Alone;
 use crate::scheduler::{BlockSpec, Id, JobSpec, SolveEnd, WorkerFacts};
 
@@ -30,16 +32,37 @@ impl ClusterState {
     }
 }
 
-impl RowSource for Cluster {
+/// The workers of a cluster as the rows of one solve. Some jobs of theirs are computed again.
+pub(crate) struct Workers<'a> {
+    cluster: &'a Cluster,
+    audits: Audits,
+}
+
+impl<'a> Workers<'a> {
+    pub(crate) fn of(cluster: &'a Cluster) -> Self {
+        let audits = Audits::new(cluster.0.limits.audit);
+        Self { cluster, audits }
+    }
+}
+
+impl RowSource for Workers<'_> {
     fn is_elsewhere(&self) -> bool {
-        true
+        !self.audits.have_failed()
+    }
+
+    fn origin(&self, job: usize) -> Option<Origin> {
+        self.audits.origin(job)
     }
 
     /// Waits for the first worker, which may come at any time.
     fn cut(&self, frame: &Frame, sampling: &Sampling, run: &Run) -> Result<Work, ExchangeError> {
+        self.audits.begin();
+        if self.audits.have_failed() {
+            return ThisProcess::default().cut(frame, sampling, run);
+        }
         run.progress.stage("waiting for a worker", 0);
-        let worker = self.smallest_worker(run.stop)?;
-        self.0.compute.install(|| {
+        let worker = self.cluster.smallest_worker(run.stop)?;
+        self.cluster.0.compute.install(|| {
             let blocks = partition(frame, sampling, worker)?;
             Ok(Work::split(frame, sampling, blocks))
         })
@@ -54,10 +77,34 @@ impl RowSource for Cluster {
         take: &mut Take<'_>,
         run: &Run,
     ) -> Result<JobCounts, ExchangeError> {
-        let mut running = self.begin(frame, work, wanted)?;
+        if self.audits.have_failed() {
+            return ThisProcess::default().trace(frame, work, wanted, take, run);
+        }
+        let mut running = self.cluster.begin(frame, work, wanted)?;
         for _ in wanted {
-            let (job, rows) = running.next(run.stop)?;
-            self.0.compute.install(|| take(job, rows))?;
+            let next = running.next(run.stop);
+            if let Err(ExchangeError::Distrusted { .. }) = &next {
+                self.audits.failed();
+            }
+            let (job, rows, brought) = next?;
+            if let Some(brought) = brought {
+                self.audits.brought(job, brought);
+                if self.audits.chooses(job) {
+                    running.audit(&self.audits, job)?;
+                }
+            }
+            self.cluster.0.compute.install(|| take(job, rows))?;
+        }
+        // everybody is audited once in a solve at least
+        for job in self.audits.of_others() {
+            run.stop.check()?;
+            running.audit(&self.audits, job)?;
+        }
+        // found out in another solve
+        let refused = self.cluster.lock().refused.clone();
+        if let Some(worker) = self.audits.any_of(&refused) {
+            self.audits.failed();
+            return Err(distrusted(&worker));
         }
         Ok(JobCounts {
             traced: wanted.len() as u64,
@@ -134,7 +181,9 @@ impl Cluster {
         let open = Open {
             blocks: sent,
             batches,
-            ends: frame.ends.len() as u32,
+            costs_s: work.jobs.iter().map(|job| job.cost_s).collect(),
+            scene: frame.block().clone(),
+            parts: work.blocks.clone(),
             results: sender,
         };
         state.solves.insert(id, open);
@@ -158,20 +207,38 @@ struct Running<'a> {
     frame: &'a Frame,
     work: &'a Work,
     id: Id,
-    results: Receiver<(usize, JobRows)>,
+    results: Receiver<Result<Brought, Arc<str>>>,
     alone: Alone,
     /// The block that the master itself computes jobs of.
     own: Option<(usize, Ready)>,
 }
 
+/// A job, its rows, and who brought them, where it was a worker.
+type Next = (usize, JobRows, Option<Said>);
+
 impl Running<'_> {
     /// The next result, whichever job it is of.
-    fn next(&mut self, stop: &Stop) -> Result<(usize, JobRows), ExchangeError> {
+    fn next(&mut self, stop: &Stop) -> Result<Next, ExchangeError> {
         loop {
             // who computes by itself does not sleep
             let patience = self.own.as_ref().map_or(PATIENCE, |_| Duration::ZERO);
             match self.results.recv_timeout(patience) {
-                Ok(result) => return Ok(result),
+                Ok(Err(worker)) => return Err(distrusted(&worker)),
+                Ok(Ok(brought)) => {
+                    let Brought {
+                        job,
+                        rows,
+                        worker,
+                        checksum,
+                    } = brought;
+                    let counts = rows.counts();
+                    let said = Said {
+                        worker,
+                        checksum,
+                        counts,
+                    };
+                    return Ok((job, rows, Some(said)));
+                }
                 Err(RecvTimeoutError::Timeout) => {}
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(ExchangeError::Failed("the workers are gone".to_owned()));
@@ -188,8 +255,8 @@ impl Running<'_> {
             drop(state);
             let limit = self.cluster.0.limits.patience;
             if self.alone.for_too_long(anybody, limit) {
-                if let Some(result) = self.compute_one()? {
-                    return Ok(result);
+                if let Some((job, rows)) = self.compute_one()? {
+                    return Ok((job, rows, None));
                 }
             } else {
                 self.own = None;
@@ -202,14 +269,38 @@ impl Running<'_> {
         let Some((job, number)) = self.cluster.lock().scheduler.waiting(self.id) else {
             return Ok(None);
         };
+        let rows = self.compute(job, number)?;
+        let first = self.cluster.lock().scheduler.known(self.id, job);
+        Ok(first.then_some((job, rows)))
+    }
+
+    /// The rows of a job of a block, computed by the master.
+    fn compute(&mut self, job: usize, number: usize) -> Result<JobRows, ExchangeError> {
         let own = match self.own.take().filter(|(of, _)| *of == number) {
             Some((_, ready)) => ready,
             None => Ready::of(&self.work.blocks[number], self.frame)?,
         };
         let rows = self.cluster.0.compute.install(|| own.rows(self.work, job));
         self.own = Some((number, own));
-        let first = self.cluster.lock().scheduler.known(self.id, job);
-        Ok(first.then_some((job, rows)))
+        Ok(rows)
+    }
+
+    /// Computes a job again; a worker that brought other rows is refused from now on.
+    fn audit(&mut self, audits: &Audits, job: usize) -> Result<(), ExchangeError> {
+        let rows = self.compute(job, self.work.jobs[job].block)?;
+        let totals = &self.cluster.0.totals;
+        totals.audited.fetch_add(1, Ordering::Relaxed);
+        let Some(worker) = audits.compare(job, &rows) else {
+            return Ok(());
+        };
+        self.cluster.refuse(&worker);
+        Err(distrusted(&worker))
+    }
+}
+
+fn distrusted(worker: &str) -> ExchangeError {
+    ExchangeError::Distrusted {
+        worker: worker.to_owned(),
     }
 }
 

@@ -38,6 +38,13 @@ pub enum SolveError {
     Stopped(#[from] Stopped),
 }
 
+impl SolveError {
+    /// Whether rows that were believed are not to be believed any more.
+    pub(crate) fn is_distrust(&self) -> bool {
+        matches!(self, Self::Exchange(ExchangeError::Distrusted { .. }))
+    }
+}
+
 impl From<ExchangeError> for SolveError {
     fn from(error: ExchangeError) -> Self {
         match error {

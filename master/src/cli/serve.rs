@@ -14,7 +14,7 @@ use tracing_subscriber::EnvFilter;
 
 use super::numbers::{positive, whole};
 use super::state::StateFlags;
-use super::workers::lease;
+use super::workers::{fraction, lease};
 
 /// Serve solves to clients over gRPC until it is stopped
 ///
@@ -37,6 +37,11 @@ pub(crate) struct ServeArgs {
     /// After this many seconds without any worker, the master computes by itself
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
     patience: Duration,
+
+    /// The share of the workers' jobs that the master computes again, to see whether they are right: 0 to 1. Of
+    /// every worker one job of a solve at least; 0 is none
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.01, value_parser = fraction, allow_negative_numbers = true)]
+    audit: f64,
 
     #[command(flatten)]
     state: StateFlags,
@@ -134,6 +139,7 @@ impl ServeArgs {
         };
         let workers = WorkerLimits {
             patience: self.patience,
+            audit: self.audit,
             ..WorkerLimits::default().with_lease(self.lease)
         };
         let kept = self.state.open()?;

@@ -226,7 +226,12 @@ impl Task {
         let solved = with_rows(workers, kept.as_ref(), |rows| {
             solve_in_rounds(scene, &self.settings, rows, &run, watch, begins)
         })?;
+        let untrusted = workers.map(|workers| workers.status().untrusted);
         drop((crew, bar));
+        for worker in untrusted.unwrap_or_default() {
+            let line = format!("worker {worker} returned wrong rows: they were computed anew");
+            self.notes.say("warning", &line);
+        }
         if let Some(kept) = kept {
             kept.close();
             if let Some(warning) = kept.warning() {

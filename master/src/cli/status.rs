@@ -81,11 +81,18 @@ fn text(status: &v1::StatusResponse) -> String {
             ),
         );
     }
+    for worker in &status.untrusted_workers {
+        let worker = printable(worker);
+        line(
+            "refused",
+            format!("worker {worker}: it returned wrong rows"),
+        );
+    }
     line(
         "jobs",
         format!(
-            "{} waiting, {} leased, {} done",
-            status.jobs_waiting, status.jobs_leased, status.jobs_done
+            "{} waiting, {} leased, {} done; {} audited since the start",
+            status.jobs_waiting, status.jobs_leased, status.jobs_done, status.jobs_audited
         ),
     );
     line(
@@ -178,6 +185,7 @@ mod tests {
                 threads: 2,
                 ..v1::WorkerInfo::default()
             }],
+            untrusted_workers: vec!["b\u{1b} at 10.0.0.7".into()],
             eta_s: Some(90.0),
             solves: vec![v1::SolveInfo {
                 solve_id: "ab".into(),
@@ -194,6 +202,7 @@ mod tests {
         for part in [
             "up 2 h 1 min",
             "2 threads",
+            "at 10.0.0.7: it returned wrong rows",
             "exchange, 3 of 16",
             "left      2 min",
         ] {

@@ -35,6 +35,11 @@ pub(crate) struct WorkersFlags {
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
     patience: Duration,
 
+    /// The share of the workers' jobs that this process computes again, to see whether they are right: 0 to 1. Of
+    /// every worker one job at least; 0 is none
+    #[arg(long, value_name = "FRACTION", default_value_t = 0.01, value_parser = fraction, allow_negative_numbers = true)]
+    audit: f64,
+
     #[command(flatten)]
     access: Access,
 }
@@ -62,6 +67,7 @@ impl WorkersFlags {
         let threads = rayon::current_num_threads();
         let limits = WorkerLimits {
             patience: self.patience,
+            audit: self.audit,
             ..WorkerLimits::default().with_lease(self.lease)
         };
         let door = Door::open(self.listen.unwrap_or(here), &self.access, limits, threads)?;
@@ -80,6 +86,12 @@ impl WorkersFlags {
         let _local = self.workers.map(start).transpose()?;
         Ok(Some(Crew { door, _local }))
     }
+}
+
+/// A part of the whole.
+pub(super) fn fraction(text: &str) -> Result<f64, String> {
+    let part = text.parse().ok().filter(|part| (0.0..=1.0).contains(part));
+    part.ok_or_else(|| "expected a number from 0 to 1".to_owned())
 }
 
 /// A lease time, or patience.

@@ -43,7 +43,8 @@ const TRADE: [&str; 7] = [
     "--quiet",
 ];
 
-const SERVE: [&str; 16] = [
+const SERVE: [&str; 17] = [
+    "--audit <FRACTION>",
     "--listen <ADDRESS:PORT>",
     "--tls-cert <FILE>",
     "--tls-key <FILE>",

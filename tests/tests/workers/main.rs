@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "what cannot be set up fails the test")]
 
 mod alone;
+mod audits;
 mod bits;
 mod faults;
 mod kept;

@@ -21,6 +21,9 @@ pub const LINE_NS: f64 = 9.0;
 /// A row of a job, ns.
 pub const ROW_NS: f64 = 1.0;
 
+/// To look whether a line of one row of a lattice meets a triangle, ns.
+pub const LOOKED_NS: f64 = 12.0;
+
 /// A ray, ns.
 pub const RAY_NS: f64 = 1000.0;
 

@@ -20,6 +20,7 @@ pub mod cost;
 pub mod directions;
 pub mod elements;
 pub mod ends;
+pub mod expected;
 pub mod far_grid;
 pub mod ground;
 pub mod job;

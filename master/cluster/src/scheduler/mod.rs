@@ -14,6 +14,7 @@ mod tests;
 mod worker;
 
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 use leases::{Lease, release};
 use solve::Solve;
@@ -145,6 +146,21 @@ impl Scheduler {
     /// Memory and threads of all workers.
     pub fn facts(&self) -> impl Iterator<Item = &WorkerFacts> {
         self.workers.values().map(|w| &w.facts)
+    }
+
+    /// Who a worker is.
+    pub fn identity(&self, worker: Id) -> Option<Arc<str>> {
+        self.workers.get(&worker).map(|w| w.facts.identity.clone())
+    }
+
+    /// All workers of an identity go.
+    pub fn dismiss(&mut self, identity: &str) {
+        let of =
+            |(&id, worker): (&Id, &Worker)| (*worker.facts.identity == *identity).then_some(id);
+        let theirs: Vec<Id> = self.workers.iter().filter_map(of).collect();
+        for worker in theirs {
+            self.leave(worker);
+        }
     }
 
     fn contact(&mut self, now: Time, worker: Id) -> Result<&mut Worker, Refusal> {

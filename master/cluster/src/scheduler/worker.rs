@@ -1,6 +1,7 @@
 //! What the scheduler knows of a worker.
 
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 use std::time::Duration;
 
 use super::{Id, Time};
@@ -10,6 +11,8 @@ use super::{Id, Time};
 pub struct WorkerFacts {
     /// For people to read.
     pub name: String,
+    /// Who it is, as far as the master can tell; for people to read too.
+    pub identity: Arc<str>,
     /// Jobs that it computes at a time.
     pub threads: u32,
     /// Memory that it may take, bytes.

@@ -1,15 +1,17 @@
 //! The file of a store: one redb database.
 
+use std::collections::BTreeSet;
 use std::fs;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use nestrad_engine::exchange::Origin;
 use nestrad_kernel::PackedRows;
 use nestrad_kernel::rows::Counts;
 use redb::{Database, DatabaseError, ReadableDatabase, ReadableTable, Table, TableDefinition};
 
-use super::Key;
+use super::{Key, Written};
 
 /// Results by name: a BLAKE3 of what follows it, four counters, the packed rows.
 const RESULTS: TableDefinition<&[u8], &[u8]> = TableDefinition::new("results");
@@ -17,11 +19,18 @@ const RESULTS: TableDefinition<&[u8], &[u8]> = TableDefinition::new("results");
 /// Names and sizes of results, by the order in which they came.
 const ORDER: TableDefinition<u64, (&[u8], u64)> = TableDefinition::new("order");
 
+/// Which worker computed a result, by name, and whether the master computed it again and found the same; there is none
+/// of what a master computed.
+const ORIGINS: TableDefinition<&[u8], (&str, bool)> = TableDefinition::new("origins");
+
 /// Checksum and counters.
 const HEAD: usize = 32 + 4 * 8;
 
 /// Memory for pages of the file, bytes.
 const CACHE_BYTES: usize = 16 << 20;
+
+/// A result, and which worker computed it.
+type Kept = (Key, Arc<PackedRows>, Option<Origin>);
 
 pub(super) struct File {
     database: Database,
@@ -72,6 +81,7 @@ impl File {
             let (mut bytes, mut next) = (0, 0);
             {
                 begun.open_table(RESULTS)?;
+                begun.open_table(ORIGINS)?;
                 for entry in begun.open_table(ORDER)?.iter()? {
                     let (number, of) = entry?;
                     bytes += of.value().1;
@@ -131,7 +141,8 @@ impl File {
             {
                 let mut by_name = begun.open_table(RESULTS)?;
                 let mut order = begun.open_table(ORDER)?;
-                drop_oldest(&mut by_name, &mut order, &mut bytes, most)?;
+                let mut origins = begun.open_table(ORIGINS)?;
+                drop_oldest(&mut by_name, &mut order, &mut origins, (&mut bytes, most))?;
             }
             begun.commit()?;
             Ok(bytes)
@@ -162,24 +173,105 @@ impl File {
         found.unwrap_or(false)
     }
 
+    /// Who computed the result of that name, where it was a worker.
+    pub(super) fn origin(&self, key: &Key) -> Result<Option<Origin>, String> {
+        let read = guarded(|| {
+            let begun = self.database.begin_read()?;
+            let found = begun.open_table(ORIGINS)?.get(&key[..])?;
+            Ok(found.map(|found| {
+                let (worker, audited) = found.value();
+                Origin {
+                    worker: worker.into(),
+                    audited,
+                }
+            }))
+        });
+        read.map_err(FileError::text)
+    }
+
+    /// Does what is to be done, in its order.
+    pub(super) fn write(&mut self, what: Vec<Written>) -> Result<(), String> {
+        let mut results = Vec::new();
+        for one in what {
+            match one {
+                Written::Result(key, rows, origin) => results.push((key, rows, origin)),
+                Written::Audited(key) => {
+                    self.put(&std::mem::take(&mut results))?;
+                    self.note_audited(&key).map_err(FileError::text)?;
+                }
+                Written::Without(worker) => {
+                    self.put(&std::mem::take(&mut results))?;
+                    self.drop_of(&worker).map_err(FileError::text)?;
+                }
+            }
+        }
+        self.put(&results)
+    }
+
+    fn note_audited(&mut self, key: &Key) -> Result<(), FileError> {
+        guarded(|| {
+            let begun = self.database.begin_write()?;
+            {
+                let mut origins = begun.open_table(ORIGINS)?;
+                let worker = origins.get(&key[..])?.map(|of| of.value().0.to_owned());
+                if let Some(worker) = worker {
+                    origins.insert(&key[..], (&worker[..], true))?;
+                }
+            }
+            begun.commit()?;
+            Ok(())
+        })
+    }
+
+    fn drop_of(&mut self, worker: &str) -> Result<(), FileError> {
+        let mut bytes = self.bytes;
+        self.bytes = guarded(|| {
+            let begun = self.database.begin_write()?;
+            {
+                let mut by_name = begun.open_table(RESULTS)?;
+                let mut order = begun.open_table(ORDER)?;
+                let mut origins = begun.open_table(ORIGINS)?;
+                let mut theirs = BTreeSet::new();
+                for origin in origins.iter()? {
+                    let (name, of) = origin?;
+                    if of.value().0 == worker {
+                        theirs.insert(name.value().to_vec());
+                    }
+                }
+                for name in &theirs {
+                    by_name.remove(&name[..])?;
+                    origins.remove(&name[..])?;
+                }
+                order.retain(|_, (name, size)| {
+                    let goes = theirs.contains(name);
+                    bytes -= if goes { size } else { 0 };
+                    !goes
+                })?;
+            }
+            begun.commit()?;
+            Ok(bytes)
+        })?;
+        Ok(())
+    }
+
     /// Keeps results, and lets go of the oldest ones where they are too many.
-    pub(super) fn put(&mut self, results: &[(Key, Arc<PackedRows>)]) -> Result<(), String> {
+    fn put(&mut self, results: &[Kept]) -> Result<(), String> {
         // what is written at a time stands beside what it takes the place of
         let most = (self.most_results() / 2).max(1) as usize;
         let mut taken = 0;
-        let together = results.chunk_by(|(_, a), (_, b)| {
+        let together = results.chunk_by(|(_, a, _), (_, b, _)| {
             taken = if taken == 0 { a.packed.len() } else { taken } + b.packed.len();
             let fits = taken <= most;
             taken = if fits { taken } else { 0 };
             fits
         });
         for some in together {
-            self.write(some)?;
+            self.put_together(some)?;
         }
         Ok(())
     }
 
-    fn write(&mut self, results: &[(Key, Arc<PackedRows>)]) -> Result<(), String> {
+    fn put_together(&mut self, results: &[Kept]) -> Result<(), String> {
         let most = self.most_results();
         let written = guarded(|| {
             let (mut bytes, mut next) = (self.bytes, self.next);
@@ -187,19 +279,24 @@ impl File {
             {
                 let mut by_name = begun.open_table(RESULTS)?;
                 let mut order = begun.open_table(ORDER)?;
-                for (key, rows) in results {
+                let mut origins = begun.open_table(ORIGINS)?;
+                for (key, rows, origin) in results {
                     let value = pack(rows);
                     let size = value.len() as u64;
                     if size > most {
                         continue;
                     }
+                    match origin {
+                        Some(of) => origins.insert(&key[..], (&*of.worker, of.audited))?,
+                        None => origins.remove(&key[..])?,
+                    };
                     // a broken one is written over, and keeps its place
                     if by_name.insert(&key[..], &value[..])?.is_some() {
                         continue;
                     }
                     order.insert(next, (&key[..], size))?;
                     (bytes, next) = (bytes + size, next + 1);
-                    drop_oldest(&mut by_name, &mut order, &mut bytes, most)?;
+                    drop_oldest(&mut by_name, &mut order, &mut origins, (&mut bytes, most))?;
                 }
             }
             begun.commit()?;
@@ -214,8 +311,8 @@ impl File {
 fn drop_oldest(
     by_name: &mut Table<&[u8], &[u8]>,
     order: &mut Table<u64, (&[u8], u64)>,
-    bytes: &mut u64,
-    most: u64,
+    origins: &mut Table<&[u8], (&str, bool)>,
+    (bytes, most): (&mut u64, u64),
 ) -> Result<(), redb::Error> {
     while *bytes > most {
         let Some((_, oldest)) = order.pop_first()? else {
@@ -223,6 +320,7 @@ fn drop_oldest(
         };
         let (name, size) = oldest.value();
         by_name.remove(name)?;
+        origins.remove(name)?;
         *bytes -= size;
     }
     Ok(())

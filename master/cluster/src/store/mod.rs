@@ -6,6 +6,7 @@
 
 mod file;
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::fs;
 use std::io;
@@ -15,8 +16,8 @@ use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
+use nestrad_engine::exchange::Origin;
 use nestrad_kernel::PackedRows;
-use nestrad_kernel::packed::{self, Shape};
 use thiserror::Error;
 
 use file::{File, FileError};
@@ -40,7 +41,14 @@ impl fmt::Debug for Store {
 }
 
 /// What is to be written.
-type Written = (Key, Arc<PackedRows>);
+enum Written {
+    /// A result, and who computed it, where it was a worker.
+    Result(Key, Arc<PackedRows>, Option<Origin>),
+    /// The result of that name was computed again, and is right.
+    Audited(Key),
+    /// No result of that worker is to be kept.
+    Without(Arc<str>),
+}
 
 struct Shared {
     file: Arc<Mutex<Option<File>>>,
@@ -50,6 +58,8 @@ struct Shared {
     /// What went wrong, for whoever asks.
     warning: Arc<Mutex<Option<String>>>,
     closed: AtomicBool,
+    /// Workers whose results are not given out.
+    distrusted: Mutex<BTreeSet<Arc<str>>>,
 }
 
 /// Why a store cannot be used.
@@ -129,18 +139,29 @@ impl Store {
             writer: Mutex::new(Some(writer)),
             warning,
             closed: AtomicBool::new(false),
+            distrusted: Mutex::default(),
         })))
     }
 
-    /// The result of that name, if it is kept and whole. The shape is that of its job.
-    pub fn get(&self, key: &Key, shape: Shape) -> Option<PackedRows> {
+    /// The result of that name, if it is kept and whole; whether it fits its job is for the caller to check.
+    pub fn get(&self, key: &Key) -> Option<PackedRows> {
         let mut file = lock(&self.0.file);
-        let read = file.as_mut()?.get(key);
+        let file_open = file.as_mut()?;
+        let distrusted = lock(&self.0.distrusted);
+        let is_trusted = |origin: Option<Origin>| {
+            origin.is_none_or(|origin| !distrusted.contains(&origin.worker))
+        };
+        let read = if distrusted.is_empty() {
+            file_open.get(key)
+        } else {
+            let origin = file_open.origin(key);
+            origin.and_then(|origin| match is_trusted(origin) {
+                true => file_open.get(key),
+                false => Ok(None),
+            })
+        };
         match read {
-            Ok(found) => found.filter(|found| {
-                let entries = found.counts.row_entries;
-                packed::check(&found.packed, shape, entries).is_ok()
-            }),
+            Ok(found) => found,
             Err(reason) => {
                 tell(
                     &self.0.warning,
@@ -158,14 +179,35 @@ impl Store {
         file.as_ref().is_some_and(|file| file.has(key))
     }
 
-    /// Keeps a result, sooner or later.
-    pub fn put(&self, key: Key, rows: &Arc<PackedRows>) {
+    /// Who computed a result that is kept; nothing where that was a master.
+    pub fn origin(&self, key: &Key) -> Option<Origin> {
+        lock(&self.0.file).as_mut()?.origin(key).ok().flatten()
+    }
+
+    /// Keeps a result, sooner or later, with who computed it, where that was a worker.
+    pub fn put(&self, key: Key, rows: &Arc<PackedRows>, origin: Option<Origin>) {
+        self.write(Written::Result(key, rows.clone(), origin));
+    }
+
+    /// Notes that a result was computed again, and is right.
+    pub fn audited(&self, key: Key) {
+        self.write(Written::Audited(key));
+    }
+
+    /// Lets go of all results of a worker, those of earlier solves too.
+    pub fn drop_of(&self, worker: &str) {
+        let worker: Arc<str> = worker.into();
+        lock(&self.0.distrusted).insert(worker.clone());
+        self.write(Written::Without(worker));
+    }
+
+    fn write(&self, what: Written) {
         if self.0.closed.load(Ordering::Relaxed) {
             return;
         }
         let sender = lock(&self.0.waiting).clone();
         if let Some(sender) = sender
-            && sender.send((key, rows.clone())).is_err()
+            && sender.send(what).is_err()
         {
             // the writer has given up, and said why
             self.0.closed.store(true, Ordering::Relaxed);
@@ -205,11 +247,11 @@ impl Drop for Shared {
 /// Writes what comes, all that is waiting at once.
 fn write(waiting: &Receiver<Written>, file: &Mutex<Option<File>>, warning: &Mutex<Option<String>>) {
     while let Ok(first) = waiting.recv() {
-        let mut results = vec![first];
-        results.extend(waiting.try_iter().take(WAITING));
+        let mut what = vec![first];
+        what.extend(waiting.try_iter().take(WAITING));
         let mut file = lock(file);
         let Some(open) = file.as_mut() else { return };
-        if let Err(reason) = open.put(&results) {
+        if let Err(reason) = open.write(what) {
             tell(
                 warning,
                 &format!("results are no longer kept: {reason}; the solve continues"),

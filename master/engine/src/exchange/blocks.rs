@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use nestrad_kernel::block::{BlockFrame, CellRun, TriangleRun};
+use nestrad_kernel::expected::Owned;
 use nestrad_kernel::{Block, BlockFault};
 
 use crate::frame::{Frame, joined};
@@ -31,6 +32,14 @@ impl BlockOf {
         self.triangles.len() == frame.organ.len()
             && self.soil_cells.len() == frame.ends.soil_cells as usize
             && self.triangles.iter().all(|&(_, owned)| owned)
+    }
+
+    /// What of the scene it holds.
+    pub fn owned(&self) -> Owned<'_> {
+        Owned {
+            triangles: &self.triangles,
+            soil_cells: &self.soil_cells,
+        }
     }
 
     /// The block, ready for the kernel.

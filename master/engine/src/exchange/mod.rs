@@ -26,7 +26,7 @@ pub use outlook::Outlook;
 pub use partition::{SmallestWorker, partition};
 pub use rows::{BatchRows, HalfRows};
 pub use sampling::{HALF_BATCHES, Sampling, lines_along};
-pub use source::{JobCounts, JobRows, RowSource, Take, Work};
+pub use source::{JobCounts, JobRows, Origin, RowSource, Take, Work};
 pub use split::{JobOf, demand};
 
 use crate::frame::Frame;
@@ -118,6 +118,12 @@ pub enum ExchangeError {
         found: usize,
         /// How many there should be.
         expected: usize,
+    },
+    /// Rows of a worker are wrong, and it had brought others: all is to be done anew, without it.
+    #[error("worker {worker} returned wrong rows")]
+    Distrusted {
+        /// Who it is.
+        worker: String,
     },
     /// It is not wanted any more.
     #[error(transparent)]

@@ -21,6 +21,11 @@ pub trait RowSource: Sync {
         false
     }
 
+    /// Who traced a job whose rows were handed over; nothing where it was this process.
+    fn origin(&self, _job: usize) -> Option<Origin> {
+        None
+    }
+
     /// Cuts an exchange into jobs.
     fn cut(&self, frame: &Frame, sampling: &Sampling, run: &Run) -> Result<Work, ExchangeError>;
 
@@ -35,6 +40,15 @@ pub trait RowSource: Sync {
     ) -> Result<JobCounts, ExchangeError>;
 }
 
+/// Who traced rows, where it was not this process.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Origin {
+    /// The worker.
+    pub worker: Arc<str>,
+    /// This process has traced them too, and found the same.
+    pub audited: bool,
+}
+
 /// Takes the rows of the job of that number.
 pub type Take<'a> = dyn FnMut(usize, JobRows) -> Result<(), ExchangeError> + Send + 'a;
 
@@ -44,7 +58,7 @@ pub struct Work {
     /// How densely it is sampled.
     pub sampling: Sampling,
     /// Parts of the scene.
-    pub blocks: Vec<BlockOf>,
+    pub blocks: Arc<[BlockOf]>,
     /// All batches, whole.
     pub batches: Vec<Batch>,
     /// By batch, then by block.
@@ -62,7 +76,7 @@ impl Work {
         let jobs = batches.iter().map(JobOf::whole).collect();
         Self {
             sampling: *sampling,
-            blocks: vec![BlockOf::whole(frame)],
+            blocks: Arc::new([BlockOf::whole(frame)]),
             batches,
             jobs,
             packed: false,
@@ -76,7 +90,7 @@ impl Work {
         let jobs = split(frame, &blocks, &batches, sampling).into();
         Self {
             sampling: *sampling,
-            blocks,
+            blocks: blocks.into(),
             batches,
             jobs,
             packed: true,

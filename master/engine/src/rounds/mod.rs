@@ -79,6 +79,9 @@ const MOST_ROUNDS: usize = 5;
 /// Solves until the accuracy of the settings is reached, or their time is up. This is where a sky becomes
 /// directions: as many as a round aims for. `begins` is told of every plan before it is carried out, and of the
 /// rounds before it.
+///
+/// Where rows turn out to be those of a worker that is not to be trusted, the rounds before may have been, too: all are
+/// done anew, without it.
 pub fn solve_in_rounds(
     scene: &Scene,
     settings: &Settings,
@@ -88,6 +91,21 @@ pub fn solve_in_rounds(
     mut begins: impl FnMut(&Plan, &[Round]),
 ) -> Result<Solved, RoundsError> {
     let begun = Instant::now();
+    loop {
+        match rounds(scene, settings, (rows, run), (begun, watch), &mut begins) {
+            Err(RoundsError::Solve(error)) if error.is_distrust() => {}
+            ended => return ended,
+        }
+    }
+}
+
+fn rounds(
+    scene: &Scene,
+    settings: &Settings,
+    (rows, run): (&dyn RowSource, &Run),
+    (begun, watch): (Instant, &mut Stopwatch),
+    begins: &mut impl FnMut(&Plan, &[Round]),
+) -> Result<Solved, RoundsError> {
     let asked = settings.accuracy_percent;
     let (mut sources, mut plan) = first(scene, settings)?;
     let mut rounds = Vec::new();
@@ -100,6 +118,7 @@ pub fn solve_in_rounds(
         let lit = lit_canopy(scene, &sources);
         let (solution, work) = match (traced::solve(&lit, &plan, rows, run, watch), last) {
             (Ok(done), _) => done,
+            (Err(error), _) if error.is_distrust() => return Err(error.into()),
             // whoever wants no more does not want the round before either
             (Err(error @ SolveError::Stopped(_)), _) | (Err(error), None) => {
                 return Err(error.into());

@@ -47,6 +47,8 @@ struct Held {
     worker_results: Counter,
     worker_results_refused: Counter,
     leases_lost: Counter,
+    jobs_audited: Counter,
+    workers_untrusted: Gauge,
     row_bytes: Counter,
     block_bytes: Counter,
     memory_bytes: Gauge,
@@ -185,6 +187,16 @@ impl Metrics {
             held.leases_lost.clone(),
         );
         registry.register(
+            "jobs_audited",
+            "Jobs of workers that the master computed again",
+            held.jobs_audited.clone(),
+        );
+        registry.register(
+            "workers_untrusted",
+            "Workers that returned wrong rows, and are refused",
+            held.workers_untrusted.clone(),
+        );
+        registry.register(
             "row_bytes",
             "Packed rows that came from workers",
             held.row_bytes.clone(),
@@ -284,6 +296,7 @@ impl Held {
         self.workers.set(now.workers.len() as i64);
         let threads: i64 = now.workers.iter().map(|w| i64::from(w.facts.threads)).sum();
         self.worker_threads.set(threads);
+        self.workers_untrusted.set(now.untrusted.len() as i64);
         for (state, count) in [
             ("waiting", now.jobs.waiting),
             ("leased", now.jobs.leased),
@@ -296,6 +309,7 @@ impl Held {
             (&self.worker_results, now.results),
             (&self.worker_results_refused, now.refused),
             (&self.leases_lost, now.lost),
+            (&self.jobs_audited, now.audited),
             (&self.row_bytes, now.bytes_in),
             (&self.block_bytes, now.bytes_out),
         ] {

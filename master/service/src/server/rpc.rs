@@ -199,6 +199,8 @@ impl SolveService for Rpc {
             scenes: self.scenes.count() as u64,
             scene_bytes: self.scenes.bytes(),
             result_bytes: self.solves.result_bytes(),
+            jobs_audited: cluster.audited,
+            untrusted_workers: cluster.untrusted.iter().map(|w| w.to_string()).collect(),
         }))
     }
 }

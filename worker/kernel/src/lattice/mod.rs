@@ -11,6 +11,8 @@ mod sides;
 mod soup;
 mod strips;
 
+use std::ops::Range;
+
 use glam::{DVec2, DVec3};
 
 use crate::touch::touch_m;
@@ -19,6 +21,7 @@ pub use scan::{Fragment, Projected};
 use sides::{MAX_SIDE, sides, wanted};
 pub use soup::Soup;
 pub use strips::Strips;
+pub(crate) use strips::rows_of_part;
 
 /// Where lines may run: what fixes a lattice to the world.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -168,6 +171,26 @@ impl Lattice {
         let corners = [lo.z, hi.z].map(|z| [lo.with_z(z), hi.with_z(z)].map(|p| self.place(p)));
         let [[a, b], [c, d]] = corners;
         [a.min(c), b.max(d)]
+    }
+
+    /// Steps of the lattice that a metre takes at most, whichever way it points.
+    pub(crate) fn most_steps_per_m(&self) -> f64 {
+        let along = |axis: usize| self.steps_per_m[axis] * self.shear[axis].hypot(1.0);
+        along(0).hypot(along(1))
+    }
+
+    /// Whether lines of some rows may meet a triangle; lattice coordinates are rounded to a millionth.
+    pub(crate) fn may_meet(&self, rows: &Range<u32>, triangle: &[DVec3; 3]) -> bool {
+        const ROUNDED: f64 = 1e-3;
+        let [a, b, c] = triangle.map(|p| self.place(p).y);
+        let (lo, hi) = (a.min(b).min(c) - ROUNDED, a.max(b).max(c) + ROUNDED);
+        let (first, last) = (f64::from(rows.start), f64::from(rows.end) - 1.0);
+        if !self.periodic {
+            return lo <= last && hi >= first;
+        }
+        // some copy of it does
+        let ny = f64::from(self.ny);
+        ((lo - last) / ny).ceil() <= ((hi - first) / ny).floor()
     }
 
     /// Number of lines.

@@ -5,6 +5,21 @@ use std::ops::Range;
 use glam::DVec3;
 
 use super::{Lattice, Projected, Soup, scan};
+use crate::part::Part;
+
+/// Rows of a lattice in a strip of about so many lines, at least one.
+fn rows_in_strip(lattice: &Lattice, lines_in_strip: usize) -> u32 {
+    let rows = lines_in_strip / lattice.nx.max(1) as usize;
+    rows.clamp(1, lattice.ny.max(1) as usize) as u32
+}
+
+/// The rows of a lattice that one of several parts of its strips has.
+pub(crate) fn rows_of_part(lattice: &Lattice, lines_in_strip: usize, part: Part) -> Range<u32> {
+    let in_strip = rows_in_strip(lattice, lines_in_strip);
+    let strips = part.of(lattice.ny.div_ceil(in_strip) as usize);
+    let row = |strip: usize| (strip as u32 * in_strip).min(lattice.ny);
+    row(strips.start)..row(strips.end)
+}
 
 /// Which triangles to draw in which strip.
 pub struct Strips<'a> {
@@ -19,8 +34,7 @@ pub struct Strips<'a> {
 impl<'a> Strips<'a> {
     /// Sorts triangles into strips of about `lines_in_strip` lines (at least one row of them).
     pub fn new(lattice: &'a Lattice, soup: &'a Soup, lines_in_strip: usize) -> Self {
-        let rows_in_strip = (lines_in_strip / lattice.nx.max(1) as usize)
-            .clamp(1, lattice.ny.max(1) as usize) as u32;
+        let rows_in_strip = rows_in_strip(lattice, lines_in_strip);
         let mut strips = Self {
             lattice,
             soup,

@@ -5,9 +5,11 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use crate::block::Block;
 use crate::elements;
-use crate::lattice::{Lattice, Projected, Strips};
+use crate::lattice::{Lattice, Projected, Strips, rows_of_part};
 use crate::part::Part;
 use crate::stacks::{CLOSE, Stacks};
 
@@ -75,6 +77,11 @@ pub(crate) fn for_each_line(
     .collect()
 }
 
+/// The rows of a lattice whose lines are those of a part of it.
+pub(crate) fn rows_of(lattice: &Lattice, part: Part) -> Range<u32> {
+    rows_of_part(lattice, LINES_IN_STRIP, part)
+}
+
 fn draw_together(
     block: &Block,
     lattices: &[Lattice],
@@ -99,6 +106,30 @@ fn draw_together(
         strip.for_each_line(&stacks, &mut |number, hits| line(k, number, hits));
     }
     lattices.iter().map(|l| l.lines() as u64).collect()
+}
+
+/// Calls `line` with the hits of every line of one row of a lattice.
+pub(crate) fn for_each_line_of_row(
+    block: &Block,
+    lattice: &Lattice,
+    row: u32,
+    mut line: impl FnMut(usize, &[Hit]),
+) {
+    let mut strip = Strip::default();
+    strip.begin(row..row + 1, lattice.nx);
+    let draw = |_, t, triangle: &[DVec3; 3]| {
+        if lattice.may_meet(&(row..row + 1), triangle)
+            && let Some(projected) = Projected::new(lattice, triangle)
+        {
+            strip.draw(block, lattice, t, &projected);
+        }
+    };
+    block
+        .soup
+        .for_each_reached_of(std::slice::from_ref(lattice), draw);
+    strip.sort();
+    let stacks = Stacks::new(lattice, &block.soup, &block.elements);
+    strip.for_each_line(&stacks, &mut line);
 }
 
 fn for_each_line_of_part(

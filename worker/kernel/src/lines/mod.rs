@@ -12,6 +12,8 @@ use crate::job::{Batch, Lines};
 use crate::lattice::Lattice;
 use crate::part::Part;
 use crate::rows::{Pair, Seen};
+pub(crate) use fragments::rows_of;
+pub(crate) use sight::LinesOnSoil;
 use sight::Sight;
 
 /// Directions that are drawn together: more would save little, and their fragments take memory.
@@ -42,6 +44,25 @@ fn seen_along(block: &Block, group: &[Lines]) -> (u64, Vec<Vec<Pair>>) {
     (lines.iter().sum(), pairs)
 }
 
+/// The pairs that see each other along the lines of one row of a lattice of a batch, which `number` chooses.
+pub(crate) fn of_one_row(block: &Block, batch: &Batch, number: u64) -> Vec<Pair> {
+    let mut pairs = Vec::new();
+    let (lattices, parts) = lattices(block, &batch.lines);
+    let pick = |bits: u64, of: u64| bits as u32 as u64 * of >> 32;
+    let k = pick(number, lattices.len() as u64) as usize;
+    if let Some((lattice, &part)) = lattices.get(k).zip(parts.get(k)) {
+        let rows = rows_of(lattice, part);
+        let row = rows.start + pick(number >> 32, rows.len() as u64) as u32;
+        if rows.contains(&row) {
+            let sight = Sight::new(block, lattice);
+            fragments::for_each_line_of_row(block, lattice, row, |line, hits| {
+                sight.along(line, hits, &mut pairs);
+            });
+        }
+    }
+    pairs
+}
+
 /// What stands at the other end of the looks into the far field, along the lines of a batch: (far end, what
 /// is there), by direction and line; past the last end, what leaves upwards and downwards.
 pub(crate) fn beyond_sphere(block: &Block, batch: &Batch) -> Vec<Pair> {
@@ -63,7 +84,7 @@ pub(crate) fn beyond_sphere(block: &Block, batch: &Batch) -> Vec<Pair> {
 }
 
 /// The lattices that have any lines, and which part of each is asked for.
-fn lattices(block: &Block, group: &[Lines]) -> (Vec<Lattice>, Vec<Part>) {
+pub(crate) fn lattices(block: &Block, group: &[Lines]) -> (Vec<Lattice>, Vec<Part>) {
     group
         .iter()
         .filter_map(|lines| {

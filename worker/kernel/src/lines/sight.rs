@@ -1,5 +1,7 @@
 //! Who sees whom along a line.
 
+use std::ops::Range;
+
 use super::burial::bury;
 use super::fragments::Hit;
 use crate::block::Block;
@@ -7,6 +9,7 @@ use crate::far_grid::{Exit, Passage};
 use crate::ground::{Along, Ground};
 use crate::lattice::{DEPTH_OF_TOP, Lattice};
 use crate::rows::Pair;
+use crate::soil::SoilGrid;
 
 /// Turns the sorted hits of a line into pairs that see each other.
 pub(crate) struct Sight<'a> {
@@ -167,6 +170,44 @@ impl<'a> Sight<'a> {
             random: (hash >> 11) as f64 / (1u64 << 53) as f64,
         });
         self.block.local(self.block.ends.far(end))
+    }
+}
+
+/// How many lines of some rows of a lattice end on each cell of the soil, in the order of their numbers: with rows
+/// and columns of cells, that is one number for each of them, to be multiplied.
+pub(crate) struct LinesOnSoil {
+    columns: Vec<u64>,
+    rows: Vec<u64>,
+}
+
+impl LinesOnSoil {
+    pub(crate) fn new(
+        soil: &SoilGrid,
+        ground: Ground,
+        lattice: &Lattice,
+        rows: Range<u32>,
+    ) -> Self {
+        let under = SoilUnder::new(soil.z_m, ground, lattice);
+        let count = |places: &[Along], cells: u32| {
+            let mut counts = vec![0; cells as usize];
+            for cell in places.iter().filter_map(|place| place.cell) {
+                counts[cell as usize] += 1;
+            }
+            counts
+        };
+        Self {
+            columns: count(&under.column, soil.cells[0]),
+            rows: count(
+                &under.row[rows.start as usize..rows.end as usize],
+                soil.cells[1],
+            ),
+        }
+    }
+
+    /// Of the cell of that number.
+    pub(crate) fn of(&self, cell: u32) -> u64 {
+        let columns = self.columns.len();
+        self.columns[cell as usize % columns] * self.rows[cell as usize / columns]
     }
 }
 

@@ -20,8 +20,10 @@ use crate::above::Above;
 use crate::block::Block;
 use crate::directions::{Purpose, stream};
 use crate::elements;
+use crate::expected::Owned;
 use crate::job::{Batch, Rays};
 use crate::rows::{Pair, Seen};
+use crate::soil::SoilGrid;
 pub use tracer::Tracer;
 use tree::FaceRay;
 
@@ -31,14 +33,7 @@ const TASK: usize = 256;
 /// Adds what rays see to what lines saw.
 pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &Batch, seen: &mut Seen) {
     let Some(rays) = &batch.rays else { return };
-    let share = Share {
-        rays,
-        batch: batch.index,
-        in_a_row_m: match batch.lines.first() {
-            Some(lines) => IN_A_ROW * lines.line_area_m2.sqrt(),
-            None => f64::INFINITY,
-        },
-    };
+    let share = Share::of(rays, batch);
     let part = rays.part;
     let triangles = part.of(block.soup.len());
     let tasks = triangles.len().div_ceil(TASK);
@@ -70,7 +65,23 @@ struct Share<'a> {
 /// Up to so many lines in a row are as good as lines here and there.
 const IN_A_ROW: f64 = 4.0;
 
-impl Share<'_> {
+impl<'a> Share<'a> {
+    fn of(rays: &'a Rays, batch: &Batch) -> Self {
+        Self {
+            rays,
+            batch: batch.index,
+            in_a_row_m: match batch.lines.first() {
+                Some(lines) => IN_A_ROW * lines.line_area_m2.sqrt(),
+                None => f64::INFINITY,
+            },
+        }
+    }
+
+    /// Rays from a cell of the soil.
+    fn of_cell(&self, soil: &SoilGrid, end: u32) -> u32 {
+        self.rays_of(soil.cell_area_m2(), soil.cell_m.max_element(), end)
+    }
+
     /// Rays in this batch for a face of that area and that longest edge: those of the half are dealt out in
     /// turn. What is long is met by many lines of a lattice at a time, if by any: these are one sample.
     fn rays_of(&self, area_m2: f64, longest_m: f64, face: u32) -> u32 {
@@ -93,28 +104,94 @@ impl Share<'_> {
     }
 }
 
+/// Of the elements of a triangle.
+struct Size {
+    element_m2: f64,
+    longest_m: f64,
+}
+
+impl Size {
+    fn of(triangle: &[DVec3; 3], divisions: u32) -> Self {
+        Self {
+            element_m2: geometry::area(triangle) / f64::from(divisions * divisions),
+            longest_m: geometry::longest_edge(triangle) / f64::from(divisions),
+        }
+    }
+
+    /// Of an element, as far as it stands above the soil.
+    fn above_m2(&self, above: &Above) -> f64 {
+        match above {
+            Above::Part(part) => part.share * self.element_m2,
+            Above::Whole | Above::Nothing => self.element_m2,
+        }
+    }
+}
+
+/// The normal of a triangle, if it has one.
+fn normal_of(triangle: &[DVec3; 3]) -> Option<DVec3> {
+    let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
+    normal.try_normalize()
+}
+
+/// Calls `count` with each row of a part of the scene, whose block is `scene`, and how many rays a job casts from it.
+pub(crate) fn count_of_rows(
+    scene: &Block,
+    owned: &Owned,
+    batch: &Batch,
+    mut count: impl FnMut(u32, u32),
+) {
+    let Some(rays) = &batch.rays else { return };
+    let share = Share::of(rays, batch);
+    let asked = rays.part.of(owned.triangles.len());
+    let mut row = 0;
+    for (k, &(t, is_owned)) in owned.triangles.iter().enumerate() {
+        let t = t as usize;
+        let elements = scene.elements.of(t);
+        if !is_owned {
+            continue;
+        }
+        let triangle = &scene.soup.triangle(t);
+        if !asked.contains(&k) || normal_of(triangle).is_none() {
+            row += 2 * elements.len() as u32;
+            continue;
+        }
+        let size = Size::of(triangle, scene.elements.divisions[t]);
+        for element in elements {
+            let area_m2 = size.above_m2(&scene.above_soil(triangle, t, element));
+            for side in 0..2 {
+                let rays = share.rays_of(area_m2, size.longest_m, 2 * element + side);
+                count(row, rays);
+                row += 1;
+            }
+        }
+    }
+    let Some(soil) = &scene.soil else { return };
+    let asked = rays.part.of(scene.ends.soil_cells as usize);
+    for &cell in owned.soil_cells {
+        if asked.contains(&(cell as usize)) {
+            count(row, share.of_cell(soil, scene.ends.soil(cell)));
+        }
+        row += 1;
+    }
+}
+
 fn from_triangle(block: &Block, tracer: &Tracer, share: &Share, t: usize, looks: &mut Vec<Pair>) {
     let triangle = &block.soup.triangle(t);
-    let normal = (triangle[1] - triangle[0]).cross(triangle[2] - triangle[0]);
-    let Some(normal) = normal.try_normalize() else {
+    let Some(normal) = normal_of(triangle) else {
         return;
     };
     let n = block.elements.divisions[t];
-    let longest_m = geometry::longest_edge(triangle) / f64::from(n);
-    let element_m2 = geometry::area(triangle) / f64::from(n * n);
+    let size = Size::of(triangle, n);
     for local in block.elements.of(t) {
         let above = block.above_soil(triangle, t, local);
-        let area_m2 = match &above {
-            Above::Part(part) => part.share * element_m2,
-            Above::Whole | Above::Nothing => element_m2,
-        };
+        let area_m2 = size.above_m2(&above);
         for side in 0..2 {
             let face = 2 * local + side;
             if block.row_of(face).is_none() {
                 continue;
             }
             let global = block.number_of(face);
-            let count = share.rays_of(area_m2, longest_m, global);
+            let count = share.rays_of(area_m2, size.longest_m, global);
             if count == 0 {
                 continue;
             }
@@ -155,7 +232,7 @@ fn from_soil(
         if block.row_of(row).is_none() {
             continue;
         }
-        let count = share.rays_of(soil.cell_area_m2(), soil.cell_m.max_element(), end);
+        let count = share.of_cell(soil, end);
         let mut rng = share.numbers(end);
         let at = DVec2::new(
             f64::from(cell % soil.cells[0]),

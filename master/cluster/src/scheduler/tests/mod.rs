@@ -11,6 +11,7 @@ fn at(seconds: f64) -> Time {
 fn facts(name: &str, threads: u32) -> WorkerFacts {
     WorkerFacts {
         name: name.to_owned(),
+        identity: name.into(),
         threads,
         memory_bytes: 1 << 40,
     }
