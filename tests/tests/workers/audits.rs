@@ -52,13 +52,15 @@ fn rows_that_are_scaled_or_left_out_are_refused_at_once() {
 fn a_result_with_more_entries_than_its_lines_can_give_takes_no_memory() {
     let (desk, expected) = maize(&[]);
     let mut solving = Solving::begin(desk.folder(), SCENE, "there", &["--memory", "1"]);
+    // made before it joins: who is silent for long is forgotten
+    let packed = vec![0xff; 128 << 20];
+    let checksum = blake3::hash(&packed).as_bytes().to_vec();
     let rogue = Rogue::join(solving.address);
     let (honest, _) = rogue.compute(&rogue.lease());
-    let packed = vec![0xff; 128 << 20];
     let header = RowsHeader {
         packed_bytes: packed.len() as u64,
         entries: 2 * (packed.len() as u64 * 8 / 6),
-        checksum: blake3::hash(&packed).as_bytes().to_vec(),
+        checksum,
         ..honest
     };
     let refused = rogue.bring(&header, &packed).unwrap_err();
