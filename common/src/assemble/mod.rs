@@ -117,6 +117,7 @@ pub fn load_canopy(inputs: &Inputs) -> Result<Canopy, LoadError> {
 fn canopy_of(geometry: Geometry, inputs: &Inputs) -> Result<(Canopy, Origins), LoadError> {
     let (mut canopy, origins) = build_canopy(geometry)?;
     canopy.declared = kinds::declared(inputs, &canopy);
+    canopy.opaque_stems = kinds::opaque_stems(inputs, &canopy);
     Ok((canopy, origins))
 }
 
