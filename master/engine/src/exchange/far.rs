@@ -69,6 +69,11 @@ impl FarRows {
         })
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        self.halves.iter().map(HalfRows::bytes).sum()
+    }
+
     /// The row of what leaves the scene that way.
     pub fn leaving(&self, exit: Exit) -> usize {
         exit.row(self.far_ends) as usize

@@ -68,6 +68,11 @@ impl Exchange {
             .ok_or_else(|| ExchangeError::Failed("jobs without result".to_owned()))
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        self.halves.iter().map(HalfRows::bytes).sum()
+    }
+
     /// Joins all batches.
     fn of_batches(mut batches: Vec<BatchRows>, counts: Counts, jobs: JobCounts) -> Self {
         let mut halves = [HalfRows::default(), HalfRows::default()];

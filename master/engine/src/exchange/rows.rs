@@ -161,6 +161,15 @@ impl HalfRows {
         })
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let of_places = match &self.batch_end {
+            BatchEnds::Short(ends) => size_of_val(&ends[..]),
+            BatchEnds::Long(ends) => size_of_val(&ends[..]),
+        };
+        (of_places + size_of_val(&self.start[..]) + size_of_val(&self.ends[..])) as u64
+    }
+
     /// Number of entries of all rows.
     pub fn entries(&self) -> u64 {
         self.ends.len() as u64

@@ -83,6 +83,18 @@ impl Aims {
         }
     }
 
+    /// Whether others ask for nothing else of how a canopy is traced.
+    pub fn trace_as(&self, other: &Self) -> bool {
+        let traced = |aims: &Self| {
+            [
+                aims.exchange_percent,
+                aims.elements_percent,
+                aims.soil_percent,
+            ]
+        };
+        traced(self) == traced(other)
+    }
+
     /// Edges of elements, in parts of those at the default accuracy.
     pub(super) fn coarser_elements(&self) -> f64 {
         (self.elements_percent / DEFAULT_ACCURACY_PERCENT).clamp(FINEST, COARSEST)

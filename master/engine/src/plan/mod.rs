@@ -104,7 +104,7 @@ pub struct Plan {
 }
 
 /// How a canopy is traced.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TracePlan {
     /// Longest edge of an element, metres.
     pub max_edge_m: f64,
@@ -346,6 +346,23 @@ impl Plan {
             },
             memory: Memory::default(),
             reasons: Vec::new(),
+        };
+        let mut plan = plan.within(lit, settings.memory_GiB)?;
+        plan.reasons = reasons::of(lit, settings, &plan);
+        Ok(plan)
+    }
+
+    /// The plan for another light of a canopy that was traced by such a plan, for these aims.
+    pub fn of_traced(
+        lit: &LitCanopy,
+        settings: &Settings,
+        (trace, aims): (&TracePlan, &Aims),
+    ) -> Result<Self, PlanError> {
+        let own = Self::aimed(lit, settings, aims)?;
+        let plan = Self {
+            trace: trace.clone(),
+            aims: *aims,
+            ..own
         };
         let mut plan = plan.within(lit, settings.memory_GiB)?;
         plan.reasons = reasons::of(lit, settings, &plan);

@@ -18,11 +18,12 @@ use thiserror::Error;
 use crate::causes::causes;
 use crate::exchange::RowSource;
 use crate::lit_canopy::LitCanopy;
-use crate::plan::{Aims, AtFinest, Plan, PlanError, Settings, WorkCounts};
+use crate::plan::{Aims, AtFinest, Plan, PlanError, Settings, TracePlan, WorkCounts};
+use crate::resident::Resident;
 use crate::run::Run;
 use crate::solution::{BandAccount, Solution};
 use crate::stopwatch::Stopwatch;
-use crate::traced::{self, SolveError, WorkDone};
+use crate::traced::{SolveError, WorkDone};
 use accuracy::worst;
 pub use accuracy::{Accuracy, Ended, Round};
 use next::Measured;
@@ -85,11 +86,28 @@ pub fn solve_in_rounds(
     rows: &dyn RowSource,
     run: &Run,
     watch: &mut Stopwatch,
+    begins: impl FnMut(&Plan, &[Round]),
+) -> Result<Solved, RoundsError> {
+    let resident = &mut Resident::between_rounds();
+    light_in_rounds((scene, resident), settings, rows, run, watch, begins)
+}
+
+/// The same with a canopy that may be resident, and is so afterwards if there is room. It begins as finely as it was
+/// traced: another light traces nothing unless it needs more.
+pub fn light_in_rounds(
+    (scene, resident): (&Scene, &mut Resident),
+    settings: &Settings,
+    rows: &dyn RowSource,
+    run: &Run,
+    watch: &mut Stopwatch,
     mut begins: impl FnMut(&Plan, &[Round]),
 ) -> Result<Solved, RoundsError> {
     let begun = Instant::now();
     let asked = settings.accuracy_percent;
-    let (mut sources, mut plan) = first(scene, settings)?;
+    let (mut sources, mut plan) = match resident.traced_for(&scene.canopy, settings) {
+        Some(traced) => again(scene, settings, traced)?,
+        None => first(scene, settings)?,
+    };
     let mut rounds = Vec::new();
     let mut last: Option<Solved> = None;
     loop {
@@ -98,7 +116,9 @@ pub fn solve_in_rounds(
         run.stop.check().map_err(SolveError::from)?;
         let round_begun = Instant::now();
         let lit = lit_canopy(scene, &sources);
-        let (solution, work) = match (traced::solve(&lit, &plan, rows, run, watch), last) {
+        let canopy = (&scene.canopy, settings);
+        let round = resident.solve(canopy, (&lit, &plan), rows, run, watch);
+        let (solution, work) = match (round, last) {
             (Ok(done), _) => done,
             // whoever wants no more does not want the round before either
             (Err(error @ SolveError::Stopped(_)), _) | (Err(error), None) => {
@@ -196,6 +216,17 @@ fn first(scene: &Scene, settings: &Settings) -> Result<(Sources, Plan), PlanErro
     }
 }
 
+/// The first round of a canopy that was traced by such a plan, for such aims.
+fn again(
+    scene: &Scene,
+    settings: &Settings,
+    (trace, aims): (&TracePlan, &Aims),
+) -> Result<(Sources, Plan), PlanError> {
+    let sources = sources_for(scene, aims, settings);
+    let plan = Plan::of_traced(&lit_canopy(scene, &sources), settings, (trace, aims))?;
+    Ok((sources, plan))
+}
+
 /// The sources of a scene, with as many directions of its sky as the aims ask for.
 fn sources_for(scene: &Scene, aims: &Aims, settings: &Settings) -> Sources {
     scene.light.sources(aims.sky_directions(), settings.seed)
@@ -226,7 +257,13 @@ fn within_limits(
         } else {
             sources.clone()
         };
-        match Plan::aimed(&lit_canopy(scene, &sources), settings, &aims) {
+        let lit = lit_canopy(scene, &sources);
+        let plan = if aims.trace_as(&last.aims) {
+            Plan::of_traced(&lit, settings, (&last.trace, &aims))
+        } else {
+            Plan::aimed(&lit, settings, &aims)
+        };
+        match plan {
             Ok(plan) => return Ok((sources, plan)),
             Err(PlanError::Memory { .. } | PlanError::Elements { .. }) => {}
             Err(_) => break,
