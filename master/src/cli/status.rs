@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use clap::Args;
 use nestrad_proto::channel::{self, Credentials};
 use nestrad_proto::v1;
@@ -11,6 +11,7 @@ use nestrad_service::client;
 use tokio::time::timeout;
 
 use super::console;
+use super::exit::Unanswered;
 
 /// A master answers within this.
 const ANSWER: Duration = Duration::from_secs(15);
@@ -40,7 +41,11 @@ impl StatusArgs {
             let mut master = client::client(channel);
             let answer = timeout(ANSWER, master.status(v1::StatusRequest {})).await;
             let answer = answer.unwrap_or_else(|_| Err(tonic::Status::unavailable("no answer")));
-            answer.map_err(|status| anyhow!("{}: {}", self.master, status.message()))
+            let answer = answer.map_err(|status| Unanswered {
+                master: self.master.clone(),
+                status,
+            });
+            Ok::<_, anyhow::Error>(answer?)
         })?;
         console::print(text(&status.into_inner()).as_bytes())
     }
@@ -70,7 +75,7 @@ fn text(status: &v1::StatusResponse) -> String {
         line(
             "worker",
             format!(
-                "{}: {} threads, {:.1} GiB; {} jobs leased, {} done, {} lost; last message {} ago",
+                "{}: {} threads, {:.2} GiB; {} jobs leased, {} done, {} lost; last message {} ago",
                 printable(&worker.name),
                 worker.threads,
                 worker.memory_gi_b,

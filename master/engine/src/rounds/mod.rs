@@ -8,6 +8,7 @@ mod accuracy;
 mod next;
 mod work;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use nestrad_common::light::Sources;
@@ -21,6 +22,7 @@ use crate::lit_canopy::LitCanopy;
 use crate::plan::{Aims, AtFinest, Plan, PlanError, Settings, WorkCounts};
 use crate::run::Run;
 use crate::solution::{BandAccount, Solution};
+use crate::solve_error::FailureKind;
 use crate::stopwatch::Stopwatch;
 use crate::traced::{self, SolveError, WorkDone};
 use accuracy::worst;
@@ -70,6 +72,16 @@ pub enum RoundsError {
     Solve(#[from] SolveError),
 }
 
+impl RoundsError {
+    /// Its kind.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::Plan(error) => error.kind(),
+            Self::Solve(error) => error.kind(),
+        }
+    }
+}
+
 /// A coarse look comes first where it takes less than this part of what is planned without one.
 const WORTH_A_LOOK: f64 = 0.2;
 
@@ -98,7 +110,11 @@ pub fn solve_in_rounds(
         run.stop.check().map_err(SolveError::from)?;
         let round_begun = Instant::now();
         let lit = lit_canopy(scene, &sources);
-        let (solution, work) = match (traced::solve(&lit, &plan, rows, run, watch), last) {
+        // a panic must not take the results of the round before with it
+        let solved = AssertUnwindSafe(|| traced::solve(&lit, &plan, rows, run, watch));
+        let solved =
+            catch_unwind(solved).unwrap_or_else(|panic| Err(SolveError::of_panic(&*panic)));
+        let (solution, work) = match (solved, last) {
             (Ok(done), _) => done,
             // whoever wants no more does not want the round before either
             (Err(error @ SolveError::Stopped(_)), _) | (Err(error), None) => {
