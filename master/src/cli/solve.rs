@@ -231,7 +231,11 @@ impl Task {
         let solved = with_rows(workers, kept.as_ref(), |rows| {
             solve_in_rounds(scene, &self.settings, rows, &run, watch, begins)
         });
+        let remarks = crew.as_ref().map(|crew| crew.cluster().remarks());
         drop((crew, bar));
+        for remark in remarks.iter().flatten() {
+            self.notes.say("warning", remark);
+        }
         if let Some(kept) = kept {
             kept.close();
             if let Some(warning) = kept.warning() {

@@ -75,14 +75,15 @@ fn text(status: &v1::StatusResponse) -> String {
         line(
             "worker",
             format!(
-                "{}: {} threads, {:.2} GiB; {} jobs leased, {} done, {} lost; last message {} ago",
+                "{}: {} threads, {:.2} GiB; {} jobs leased, {} done, {} lost; last message {} ago{}",
                 printable(&worker.name),
                 worker.threads,
                 worker.memory_gi_b,
                 worker.leased,
                 worker.done,
                 worker.lost,
-                time(worker.silent_s)
+                time(worker.silent_s),
+                too_small(worker)
             ),
         );
     }
@@ -127,6 +128,12 @@ fn text(status: &v1::StatusResponse) -> String {
         }
     }
     text
+}
+
+fn too_small(worker: &v1::WorkerInfo) -> String {
+    let needs = worker.needs_memory_gi_b;
+    let said = |needs| format!("; idle: too small, the smallest block needs {needs:.2} GiB");
+    needs.map(said).unwrap_or_default()
 }
 
 fn solve(solve: &v1::SolveInfo) -> String {
@@ -181,6 +188,7 @@ mod tests {
             workers: vec![v1::WorkerInfo {
                 name: "a\u{1b}[2J".into(),
                 threads: 2,
+                needs_memory_gi_b: Some(1.204),
                 ..v1::WorkerInfo::default()
             }],
             eta_s: Some(90.0),
@@ -199,6 +207,7 @@ mod tests {
         for part in [
             "up 2 h 1 min",
             "2 threads",
+            "idle: too small, the smallest block needs 1.20 GiB",
             "exchange, 3 of 16",
             "left      2 min",
         ] {

@@ -217,6 +217,7 @@ fn worker_info(worker: &WorkerCounts) -> v1::WorkerInfo {
         done: worker.done,
         lost: worker.lost,
         silent_s: worker.silent.as_secs_f64(),
+        needs_memory_gi_b: worker.too_small_for.map(GiB),
     }
 }
 
