@@ -14,7 +14,8 @@ use clap::Parser;
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    let command = Cli::parse().command;
+    cli::code_of(|| match command {
         Command::Solve(args) => args.run(),
         Command::Check(args) => args.run(),
         Command::Generate(args) => args.run(),
@@ -22,6 +23,5 @@ fn main() -> ExitCode {
         Command::Serve(args) => args.run(),
         Command::Status(args) => args.run(),
         Command::Trade(args) => args.run(),
-    };
-    cli::exit_code(outcome)
+    })
 }

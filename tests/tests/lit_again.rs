@@ -304,7 +304,14 @@ fn a_first_round_that_fails_says_why() {
 fn light(scene: &Scene, settings: &Settings, resident: &mut Resident) -> rounds::Solved {
     let (rows, watch) = (ThisProcess::default(), &mut Stopwatch::start());
     unwatched(|run| {
-        light_in_rounds((scene, &mut *resident), settings, &rows, run, watch, |_, _| ())
+        light_in_rounds(
+            (scene, &mut *resident),
+            settings,
+            &rows,
+            run,
+            watch,
+            |_, _| (),
+        )
     })
     .unwrap()
 }

@@ -11,9 +11,10 @@ use std::time::{Duration, Instant};
 use nestrad_engine::exchange::JobRows;
 use nestrad_proto::v1;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::{Notify, Semaphore};
+use tokio::sync::Notify;
 
 use crate::blocks::SentBlock;
+use crate::room::Room;
 use crate::scheduler::{Id, Rules, Scheduler, SolveCounts, Time, WorkerCounts};
 use crate::sending::Turns;
 
@@ -24,11 +25,11 @@ pub struct WorkerLimits {
     pub rules: Rules,
     /// How often a worker is to be heard of.
     pub heartbeat: Duration,
-    /// Bytes of results that are on their way in at a time; no single result is larger.
+    /// Bytes of results that are on their way in at a time; no single result is larger than half of it.
     pub result_bytes: u32,
     /// Workers at a time.
     pub workers: usize,
-    /// Without any worker for so long, the master computes by itself.
+    /// Without any worker, or without progress of those that are there, for so long, the master computes by itself.
     pub patience: Duration,
 }
 
@@ -67,8 +68,8 @@ pub(crate) struct Shared {
     pub(crate) changed: Notify,
     /// A worker has joined.
     pub(crate) joined: Condvar,
-    /// Kibibytes of results that may come in now.
-    pub(crate) room: Semaphore,
+    /// For results that come in.
+    pub(crate) room: Room,
     /// Who is sent a block now.
     pub(crate) turns: Turns,
     /// Where rows are checked and joined.
@@ -83,8 +84,10 @@ pub(crate) struct ClusterState {
     pub(crate) draining: bool,
     /// Workers are told to come back later.
     pub(crate) closed: bool,
-    /// Why nothing can be computed any more.
-    pub(crate) failed: Option<String>,
+    /// No worker will come any more.
+    pub(crate) deserted: bool,
+    /// What the user may want to know, each once.
+    pub(crate) remarks: Vec<String>,
 }
 
 /// A solve at which workers work.
@@ -163,12 +166,13 @@ impl Cluster {
                 solves: HashMap::new(),
                 draining: false,
                 closed: false,
-                failed: None,
+                deserted: false,
+                remarks: Vec::new(),
             }),
             changed: Notify::new(),
             joined: Condvar::new(),
             turns: Turns::new(),
-            room: Semaphore::new(kibibytes(u64::from(limits.result_bytes)) as usize),
+            room: Room::new(u64::from(limits.result_bytes)),
             compute,
             totals: Totals::default(),
             limits,
@@ -189,9 +193,20 @@ impl Cluster {
         self.0.changed.notify_waiters();
     }
 
-    /// Ends all solves, now and later: there will be no workers.
-    pub fn fail(&self, reason: &str) {
-        self.lock().failed = Some(reason.to_owned());
+    /// There are no workers any more, and there will be none: the master computes by itself.
+    pub fn desert(&self, reason: &str) {
+        let now = self.now();
+        let mut state = self.lock();
+        state.deserted = true;
+        state.scheduler.all_leave(now);
+        state.remark(format!("{reason}: the master computes by itself"));
+        drop(state);
+        self.0.joined.notify_all();
+    }
+
+    /// What the user may want to know of the workers, each thing once.
+    pub fn remarks(&self) -> Vec<String> {
+        self.lock().remarks.clone()
     }
 
     /// Whether anybody is there to compute.
@@ -231,6 +246,19 @@ impl Cluster {
     pub(crate) fn lock(&self) -> MutexGuard<'_, ClusterState> {
         // the state is whole between any two calls of the scheduler
         self.0.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Remarks that are kept.
+const MOST_REMARKS: usize = 100;
+
+impl ClusterState {
+    /// Notes what the user may want to know; once, however often it is so.
+    pub(crate) fn remark(&mut self, remark: String) {
+        if self.remarks.len() < MOST_REMARKS && !self.remarks.contains(&remark) {
+            tracing::warn!("{remark}");
+            self.remarks.push(remark);
+        }
     }
 }
 

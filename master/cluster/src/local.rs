@@ -79,7 +79,7 @@ impl LocalWorkers {
                 if !lives && !told {
                     told = true;
                     let n = children.len();
-                    cluster.fail(&format!("all {n} worker processes have ended"));
+                    cluster.desert(&format!("all {n} worker processes have ended"));
                 }
             }
             stop(children, FAREWELL);

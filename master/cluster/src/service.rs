@@ -16,7 +16,7 @@ use nestrad_proto::v1::{
 use tokio::sync::oneshot;
 use tonic::{Request, Response, Status, Streaming};
 
-use crate::cluster::{Cluster, ClusterState, kibibytes};
+use crate::cluster::{Cluster, ClusterState};
 use crate::receive::{self, Expected};
 use crate::scheduler::{BlockId, Id, Leased, Refusal, WorkerFacts};
 use crate::sending::Sending;
@@ -54,8 +54,9 @@ impl From<Refusal> for Status {
 #[tonic::async_trait]
 impl WorkerService for Service {
     async fn join(&self, request: Request<JoinRequest>) -> Result<Response<JoinResponse>, Status> {
+        let peer = peer(&request);
         let asked = request.into_inner();
-        let facts = facts(&asked)?;
+        let facts = facts(&asked, &peer)?;
         let kernel = nestrad_kernel::kernel();
         if asked.kernel != kernel {
             return Err(Status::failed_precondition(format!(
@@ -106,8 +107,13 @@ impl WorkerService for Service {
             if let Some(answer) = cluster.lease_now(asked.worker_id, &held)? {
                 break answer;
             }
-            if tokio::time::timeout_at(until, changed).await.is_err() {
-                break lease_response::Answer::Nothing(Nothing {});
+            let (needs, is_news) = cluster.too_small(asked.worker_id);
+            let is_over = || tokio::time::timeout_at(until, changed);
+            if is_news || is_over().await.is_err() {
+                let nothing = Nothing {
+                    needs_memory_bytes: needs,
+                };
+                break lease_response::Answer::Nothing(nothing);
             }
         };
         Ok(Response::new(LeaseResponse {
@@ -146,6 +152,11 @@ impl WorkerService for Service {
         request: Request<RenewRequest>,
     ) -> Result<Response<RenewResponse>, Status> {
         let asked = request.into_inner();
+        let most = 2 * MOST_THREADS as usize;
+        if asked.lease_ids.len() > most {
+            let text = format!("lease_ids: expected at most {most}");
+            return Err(Status::invalid_argument(text));
+        }
         let now = self.0.now();
         let mut state = self.0.lock();
         let unwanted = state
@@ -181,7 +192,8 @@ impl WorkerService for Service {
         request: Request<LeaveRequest>,
     ) -> Result<Response<LeaveResponse>, Status> {
         let worker = request.into_inner().worker_id;
-        self.0.lock().scheduler.leave(worker);
+        let now = self.0.now();
+        self.0.lock().scheduler.leave(now, worker);
         self.0.0.changed.notify_waiters();
         tracing::info!("worker leaves");
         Ok(Response::new(LeaveResponse {}))
@@ -226,6 +238,26 @@ impl Cluster {
         Ok(job.map(lease_response::Answer::Job))
     }
 
+    /// Memory that the smallest block needs of a worker that has less, bytes, and whether it does not know yet; 0
+    /// where it has enough.
+    fn too_small(&self, worker: Id) -> (u64, bool) {
+        const GIB: f64 = (1u64 << 30) as f64;
+        let mut state = self.lock();
+        let Some((needs, is_news)) = state.scheduler.tell_too_small(worker) else {
+            return (0, false);
+        };
+        if is_news && let Some(facts) = state.scheduler.facts_of(worker) {
+            let remark = format!(
+                "worker '{}' is idle: the smallest block needs {:.2} GiB of its memory, it has {:.2} GiB",
+                facts.name,
+                needs as f64 / GIB,
+                facts.memory_bytes as f64 / GIB
+            );
+            state.remark(remark);
+        }
+        (needs, is_news)
+    }
+
     fn given_back(&self, worker: Id, lease: Id, failure: Option<&str>) -> Result<(), Status> {
         let now = self.now();
         if let Some(reason) = failure {
@@ -254,9 +286,8 @@ impl Cluster {
         };
         let taken = async {
             receive::check_header(&header, &expected)?;
-            let room = self.0.room.acquire_many(kibibytes(header.packed_bytes));
-            let _room = room.await.map_err(|_| Status::cancelled("master ends"))?;
-            let body = receive::body(&mut stream, &header, patience).await?;
+            let mut coming = self.0.room.enter(header.packed_bytes).await?;
+            let body = receive::body(&mut stream, &header, &mut coming, patience).await?;
             let bytes = body.len() as u64;
             self.0.totals.bytes_in.fetch_add(bytes, Ordering::Relaxed);
             let (sender, checked) = oneshot::channel();
@@ -292,7 +323,7 @@ impl Cluster {
                     rows: open.blocks[leased.block].rows,
                     ends: open.ends,
                 },
-                most_bytes: u64::from(self.0.limits.result_bytes),
+                most_bytes: self.0.room.most_bytes(),
             })
         }))
     }
@@ -318,7 +349,18 @@ impl Cluster {
     }
 }
 
-fn facts(asked: &JoinRequest) -> Result<WorkerFacts, Status> {
+/// Who calls: its certificate where it has one, else its address.
+fn peer<T>(request: &Request<T>) -> Vec<u8> {
+    let certificates = request.peer_certs();
+    let own = certificates.as_deref().and_then(|chain| chain.first());
+    match (own, request.remote_addr()) {
+        (Some(certificate), _) => certificate.to_vec(),
+        (None, Some(address)) => address.ip().to_string().into_bytes(),
+        (None, None) => Vec::new(),
+    }
+}
+
+fn facts(asked: &JoinRequest, peer: &[u8]) -> Result<WorkerFacts, Status> {
     if asked.name.len() > LONGEST_NAME {
         let text = format!("name: expected at most {LONGEST_NAME} bytes");
         return Err(Status::invalid_argument(text));
@@ -327,8 +369,12 @@ fn facts(asked: &JoinRequest) -> Result<WorkerFacts, Status> {
         let text = format!("threads: expected 1 to {MOST_THREADS}");
         return Err(Status::invalid_argument(text));
     }
+    let mut identity = blake3::Hasher::new();
+    identity.update(&(peer.len() as u64).to_le_bytes());
+    identity.update(peer).update(asked.name.as_bytes());
     Ok(WorkerFacts {
         name: shown(&asked.name, LONGEST_NAME),
+        identity: *identity.finalize().as_bytes(),
         threads: asked.threads,
         memory_bytes: asked.memory_bytes,
     })

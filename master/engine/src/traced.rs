@@ -29,7 +29,7 @@ use crate::plan::{LightPlan, Plan, TracePlan};
 use crate::progress::Progress;
 use crate::run::Run;
 use crate::solution::Solution;
-pub use crate::solve_error::SolveError;
+pub use crate::solve_error::{FailureKind, SolveError};
 use crate::solver::{FarSample, Groups, Irradiance, Sampled, System, solve as solve_system};
 use crate::stopwatch::Stopwatch;
 

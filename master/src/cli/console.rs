@@ -1,12 +1,8 @@
 //! What is said to the user: results on stdout, notes and errors on stderr.
 
 use std::io::{self, ErrorKind, Write};
-use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-
-/// Input that cannot be used, or a solve that failed.
-const FAILURE: u8 = 1;
 
 /// Writes to stdout. A reader that has seen enough (`nestrad check ... | head`) is no error.
 pub(crate) fn print(text: &[u8]) -> Result<()> {
@@ -33,28 +29,14 @@ impl Notes {
     }
 }
 
-/// The exit code of a command, whose error is reported: 0, 1 where it failed, 2 where it was called
-/// in a way that makes no sense.
-pub(crate) fn exit_code(outcome: Result<()>) -> ExitCode {
-    let Err(error) = outcome else {
-        return ExitCode::SUCCESS;
-    };
-    if let Some(usage) = error.downcast_ref::<clap::Error>() {
-        // nothing can be done about a stderr that is gone
-        let _ = usage.print();
-        return u8::try_from(usage.exit_code()).unwrap_or(FAILURE).into();
-    }
-    note("error", &chain(&error));
-    FAILURE.into()
-}
-
-fn note(what: &str, line: &str) {
+/// A line on stderr.
+pub(super) fn note(what: &str, line: &str) {
     // nothing can be done about a stderr that is gone
     let _ = writeln!(io::stderr().lock(), "{what}: {line}");
 }
 
 /// An error and its causes in one line. Where a message says what its cause says too, it is said once.
-fn chain(error: &anyhow::Error) -> String {
+pub(super) fn chain(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain() {
         let cause = cause.to_string();

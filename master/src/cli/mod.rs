@@ -3,6 +3,7 @@
 mod bar;
 mod check;
 mod console;
+mod exit;
 mod flags;
 mod generate;
 mod numbers;
@@ -18,7 +19,7 @@ mod workers;
 
 use clap::{Parser, Subcommand};
 
-pub(crate) use console::exit_code;
+pub(crate) use exit::code_of;
 
 /// Computes how much light every leaf of a plant canopy absorbs.
 ///

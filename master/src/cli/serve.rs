@@ -34,7 +34,7 @@ pub(crate) struct ServeArgs {
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
 
-    /// After this many seconds without any worker, the master computes by itself
+    /// After this many seconds without results from workers, the master computes by itself
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
     patience: Duration,
 

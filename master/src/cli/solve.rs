@@ -14,7 +14,7 @@ use nestrad_common::scene::Scene;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::plan::{Estimator, Plan, Settings};
 use nestrad_engine::progress::Progress;
-use nestrad_engine::rounds::{Accuracy, Round, solve_in_rounds};
+use nestrad_engine::rounds::{Accuracy, Ended, Round, solve_in_rounds};
 use nestrad_engine::run::Run;
 use nestrad_engine::stop::Stop;
 use nestrad_engine::stopwatch::{Stage, Stopwatch, Usage};
@@ -26,6 +26,7 @@ use serde::Deserialize;
 
 use super::bar::Bar;
 use super::console::{self, Notes};
+use super::exit::MissedTarget;
 use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
 use super::record::OptionsRecord;
@@ -37,6 +38,10 @@ use super::workers::{Crew, WorkersFlags};
 ///
 /// Writes organs.csv, triangles.csv, soil.csv (where there is a soil plane) and summary.json into DIR; after an
 /// error DIR is unchanged. The plan goes to stderr, a table of the energy balance to stdout.
+///
+/// Exit codes: 0 success; 1 input that cannot be used; 2 wrong flags; 3 results were written, but a fault kept them
+/// from the asked accuracy; 4 a limit (memory, time, size, queue) does not allow it; 5 the master cannot be reached,
+/// went away, or refuses the caller; 6 an inner fault; 130 cancelled.
 #[derive(Debug, Args)]
 pub(crate) struct SolveArgs {
     #[command(flatten)]
@@ -225,14 +230,19 @@ impl Task {
         let workers = crew.as_ref().map(Crew::cluster);
         let solved = with_rows(workers, kept.as_ref(), |rows| {
             solve_in_rounds(scene, &self.settings, rows, &run, watch, begins)
-        })?;
+        });
+        let remarks = crew.as_ref().map(|crew| crew.cluster().remarks());
         drop((crew, bar));
+        for remark in remarks.iter().flatten() {
+            self.notes.say("warning", remark);
+        }
         if let Some(kept) = kept {
             kept.close();
             if let Some(warning) = kept.warning() {
                 self.notes.say("warning", &warning);
             }
         }
+        let solved = solved?;
         Ok(SolvedThere {
             plan: serde_json::to_value(solved.plan_record())
                 .context("the plan cannot be written down")?,
@@ -307,24 +317,31 @@ impl Task {
             stages: &stages,
             resources: usage,
         })?;
-        if self.notes.quiet {
-            return Ok(());
+        // a master of an earlier version says nothing of it
+        let accuracy = Accuracy::deserialize(&solved.plan["accuracy"]).ok();
+        if !self.notes.quiet {
+            if let Some(accuracy) = &accuracy {
+                self.notes.say("accuracy", &accuracy.to_string());
+            }
+            let mut table = Vec::new();
+            terminal::write(&mut table, canopy, solution, usage)?;
+            console::print(&table)?;
+            let place = self.out.display();
+            self.notes.say("done", &format!("results are in {place}"));
         }
-        self.say_accuracy(&solved.plan);
-        let mut table = Vec::new();
-        terminal::write(&mut table, canopy, solution, usage)?;
-        console::print(&table)?;
-        let place = self.out.display();
-        self.notes.say("done", &format!("results are in {place}"));
-        Ok(())
+        let missed = accuracy.and_then(|accuracy| self.missed(accuracy));
+        missed.map_or(Ok(()), |missed| Err(missed.into()))
     }
 
-    /// Says whether the accuracy was reached, and what the error comes from.
-    fn say_accuracy(&self, plan: &serde_json::Value) {
-        // a master of an earlier version says nothing of it
-        if let Ok(accuracy) = Accuracy::deserialize(&plan["accuracy"]) {
-            self.notes.say("accuracy", &accuracy.to_string());
-        }
+    /// The error of a solve whose results are those of an earlier round, for a finer one failed.
+    fn missed(&self, accuracy: Accuracy) -> Option<MissedTarget> {
+        let is_fault = accuracy.ended == Ended::Failed;
+        is_fault.then(|| MissedTarget {
+            asked_percent: accuracy.asked_percent,
+            reached_percent: accuracy.rounds.last().and_then(|r| r.reached_percent),
+            fault: accuracy.failure.unwrap_or_default(),
+            place: self.out.display().to_string(),
+        })
     }
 
     fn formats(&self) -> Formats {

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use clap::Args;
 use nestrad_proto::channel::{self, Credentials};
 use nestrad_proto::v1;
@@ -11,6 +11,7 @@ use nestrad_service::client;
 use tokio::time::timeout;
 
 use super::console;
+use super::exit::Unanswered;
 
 /// A master answers within this.
 const ANSWER: Duration = Duration::from_secs(15);
@@ -40,7 +41,11 @@ impl StatusArgs {
             let mut master = client::client(channel);
             let answer = timeout(ANSWER, master.status(v1::StatusRequest {})).await;
             let answer = answer.unwrap_or_else(|_| Err(tonic::Status::unavailable("no answer")));
-            answer.map_err(|status| anyhow!("{}: {}", self.master, status.message()))
+            let answer = answer.map_err(|status| Unanswered {
+                master: self.master.clone(),
+                status,
+            });
+            Ok::<_, anyhow::Error>(answer?)
         })?;
         console::print(text(&status.into_inner()).as_bytes())
     }
@@ -70,14 +75,15 @@ fn text(status: &v1::StatusResponse) -> String {
         line(
             "worker",
             format!(
-                "{}: {} threads, {:.1} GiB; {} jobs leased, {} done, {} lost; last message {} ago",
+                "{}: {} threads, {:.2} GiB; {} jobs leased, {} done, {} lost; last message {} ago{}",
                 printable(&worker.name),
                 worker.threads,
                 worker.memory_gi_b,
                 worker.leased,
                 worker.done,
                 worker.lost,
-                time(worker.silent_s)
+                time(worker.silent_s),
+                too_small(worker)
             ),
         );
     }
@@ -122,6 +128,12 @@ fn text(status: &v1::StatusResponse) -> String {
         }
     }
     text
+}
+
+fn too_small(worker: &v1::WorkerInfo) -> String {
+    let needs = worker.needs_memory_gi_b;
+    let said = |needs| format!("; idle: too small, the smallest block needs {needs:.2} GiB");
+    needs.map(said).unwrap_or_default()
 }
 
 fn solve(solve: &v1::SolveInfo) -> String {
@@ -176,6 +188,7 @@ mod tests {
             workers: vec![v1::WorkerInfo {
                 name: "a\u{1b}[2J".into(),
                 threads: 2,
+                needs_memory_gi_b: Some(1.204),
                 ..v1::WorkerInfo::default()
             }],
             eta_s: Some(90.0),
@@ -194,6 +207,7 @@ mod tests {
         for part in [
             "up 2 h 1 min",
             "2 threads",
+            "idle: too small, the smallest block needs 1.20 GiB",
             "exchange, 3 of 16",
             "left      2 min",
         ] {

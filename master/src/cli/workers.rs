@@ -31,7 +31,7 @@ pub(crate) struct WorkersFlags {
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
 
-    /// After this many seconds without any worker, this process computes by itself
+    /// After this many seconds without results from workers, this process computes by itself
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
     patience: Duration,
 

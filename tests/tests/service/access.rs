@@ -67,7 +67,7 @@ fn tokens_open_one_service_each_and_are_never_logged() {
 
     let solve = ["solve", "scene.toml", "--out", "out", "--master", &url];
     let refused = desk.run(&solve);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(5));
     assert!(
         said(&refused).contains("expected a bearer token"),
         "{}",

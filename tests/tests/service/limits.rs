@@ -58,7 +58,7 @@ fn a_scene_that_is_too_large_is_refused_with_the_limit() {
         "--master",
         &url,
     ]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(4));
     assert!(said(&output).contains("107374 bytes"), "{}", said(&output));
     assert!(!desk.path("out").exists());
 }

@@ -12,6 +12,7 @@ mod garbage;
 mod light;
 mod limits;
 mod many_solves;
+mod missed;
 mod python;
 mod results;
 mod stopping;

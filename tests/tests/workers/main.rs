@@ -5,6 +5,7 @@
 mod alone;
 mod bits;
 mod faults;
+mod hold_ups;
 mod kept;
 mod masters;
 mod memory;

@@ -8,6 +8,7 @@ mod accuracy;
 mod next;
 mod work;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use nestrad_common::light::Sources;
@@ -22,6 +23,7 @@ use crate::plan::{Aims, AtFinest, Plan, PlanError, Settings, TracePlan, WorkCoun
 use crate::resident::Resident;
 use crate::run::Run;
 use crate::solution::{BandAccount, Solution};
+use crate::solve_error::FailureKind;
 use crate::stopwatch::Stopwatch;
 use crate::traced::{SolveError, WorkDone};
 use accuracy::worst;
@@ -71,6 +73,16 @@ pub enum RoundsError {
     Solve(#[from] SolveError),
 }
 
+impl RoundsError {
+    /// Its kind.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::Plan(error) => error.kind(),
+            Self::Solve(error) => error.kind(),
+        }
+    }
+}
+
 /// A coarse look comes first where it takes less than this part of what is planned without one.
 const WORTH_A_LOOK: f64 = 0.2;
 
@@ -117,7 +129,11 @@ pub fn light_in_rounds(
         let round_begun = Instant::now();
         let lit = lit_canopy(scene, &sources);
         let canopy = (&scene.canopy, settings);
-        let round = resident.solve(canopy, (&lit, &plan), rows, run, watch);
+        // a panic must not take the results of the round before with it
+        let round = catch_unwind(AssertUnwindSafe(|| {
+            resident.solve(canopy, (&lit, &plan), rows, run, watch)
+        }));
+        let round = round.unwrap_or_else(|panic| Err(SolveError::of_panic(&*panic)));
         let (solution, work) = match (round, last) {
             (Ok(done), _) => done,
             // whoever wants no more does not want the round before either

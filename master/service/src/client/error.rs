@@ -1,6 +1,8 @@
 //! Why a master gives no solution.
 
+use nestrad_engine::traced::FailureKind;
 use thiserror::Error;
+use tonic::Code;
 
 /// Why there is no solution.
 #[derive(Debug, Error)]
@@ -12,6 +14,8 @@ pub enum RemoteError {
         doing: &'static str,
         /// What it said.
         message: String,
+        /// What kind of refusal it is.
+        kind: RefusalKind,
     },
     /// The master is not there.
     #[error("the master cannot be reached: {message}")]
@@ -24,6 +28,8 @@ pub enum RemoteError {
     Failed {
         /// Why.
         reason: String,
+        /// What kind of thing went wrong.
+        kind: FailureKind,
     },
     /// Somebody stopped it.
     #[error("the solve was cancelled")]
@@ -31,4 +37,26 @@ pub enum RemoteError {
     /// What the master sent is not what was asked for.
     #[error("the master sent {0}")]
     Answer(&'static str),
+}
+
+/// What kind of refusal an answer is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RefusalKind {
+    /// What was sent cannot be.
+    Input,
+    /// A limit of the master does not allow it.
+    Limit,
+    /// The master is not there, or not for this caller.
+    Master,
+}
+
+impl RefusalKind {
+    /// By the code of an answer.
+    pub fn of(code: Code) -> Self {
+        match code {
+            Code::InvalidArgument | Code::OutOfRange => Self::Input,
+            Code::ResourceExhausted | Code::DeadlineExceeded => Self::Limit,
+            _ => Self::Master,
+        }
+    }
 }

@@ -15,13 +15,14 @@ use nestrad_common::options::Diameter;
 use nestrad_common::scene::Scene;
 use nestrad_engine::plan::{DEFAULT_ACCURACY_PERCENT, Estimator, Settings};
 use nestrad_engine::progress::StageProgress;
+use nestrad_engine::traced::FailureKind;
 use nestrad_proto::channel::Authorized;
 use nestrad_proto::v1::solve_service_client::SolveServiceClient;
 use nestrad_proto::{MAX_MESSAGE_BYTES, v1};
 use tokio::time::{sleep, timeout};
 use tonic::{Code, Status};
 
-pub use error::RemoteError;
+pub use error::{RefusalKind, RemoteError};
 use results::Arriving;
 pub use solved::SolvedThere;
 
@@ -106,6 +107,15 @@ fn options(settings: &Settings) -> v1::SolveOptions {
         seed: Some(settings.seed),
         estimator: estimator.into(),
         budget_s: settings.budget_s,
+    }
+}
+
+/// What kind of thing went wrong at the master; one of an earlier version does not say.
+fn kind(sent: v1::SolveFailure) -> FailureKind {
+    match sent {
+        v1::SolveFailure::Input => FailureKind::Input,
+        v1::SolveFailure::Limit => FailureKind::Limit,
+        v1::SolveFailure::Fault | v1::SolveFailure::Unspecified => FailureKind::Fault,
     }
 }
 
@@ -238,15 +248,16 @@ impl Session {
                 Err(status) => return Err(self.setback(doing, status)),
             };
             self.heard = Some(Instant::now());
-            let state = message.state();
+            let (state, failure) = (message.state(), message.failure());
             for line in message.plan {
                 tell(Event::Plan(line));
             }
             match state {
                 v1::SolveState::Finished => return Ok(()),
                 v1::SolveState::Failed => {
+                    let kind = kind(failure);
                     let reason = message.reason;
-                    return Err(RemoteError::Failed { reason }.into());
+                    return Err(RemoteError::Failed { reason, kind }.into());
                 }
                 v1::SolveState::Cancelled => return Err(RemoteError::Cancelled.into()),
                 _ => tell(Event::Stage(StageProgress {
@@ -321,6 +332,7 @@ impl Session {
             }
             _ => Setback::Final(RemoteError::Refused {
                 doing,
+                kind: RefusalKind::of(status.code()),
                 message: status.message().to_owned(),
             }),
         }

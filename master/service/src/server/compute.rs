@@ -11,7 +11,7 @@ use nestrad_engine::plan::Plan;
 use nestrad_engine::rounds::{Round, RoundsError, solve_in_rounds};
 use nestrad_engine::run::Run;
 use nestrad_engine::stopwatch::Stopwatch;
-use nestrad_engine::traced::SolveError;
+use nestrad_engine::traced::FailureKind;
 use rayon::ThreadPool;
 use thiserror::Error;
 
@@ -39,12 +39,18 @@ pub(super) fn work(solves: &Solves, means: &Means, metrics: &Metrics) {
         let ended = catch_unwind(AssertUnwindSafe(|| {
             means.pool.install(|| end_of(&solve, means, metrics))
         }));
-        let phase = ended.unwrap_or_else(|_| Phase::Failed("internal fault".to_owned()));
+        let phase = ended
+            .unwrap_or_else(|_| Phase::Failed(FailureKind::Fault, "internal fault".to_owned()));
         match &phase {
             Phase::Finished(solution) => {
-                tracing::info!(wall_s = solution.summary.wall_s, "finished");
+                let summary = &solution.summary;
+                if !summary.fault.is_empty() {
+                    let fault = summary.fault.as_str();
+                    tracing::warn!(fault, "a finer round failed: the accuracy is missed");
+                }
+                tracing::info!(wall_s = summary.wall_s, "finished");
             }
-            Phase::Failed(reason) => tracing::warn!(reason, "failed"),
+            Phase::Failed(_, reason) => tracing::warn!(reason, "failed"),
             _ => tracing::info!("cancelled"),
         }
         metrics.ended(&phase);
@@ -63,8 +69,10 @@ fn end_of(solve: &Solve, means: &Means, metrics: &Metrics) -> Phase {
             metrics.solved(&solution.summary);
             Phase::Finished(Arc::new(solution))
         }
-        Err(Fault::Rounds(RoundsError::Solve(SolveError::Stopped(_)))) => Phase::Cancelled,
-        Err(fault) => Phase::Failed(causes(&fault)),
+        Err(fault) => match fault.kind() {
+            FailureKind::Cancelled => Phase::Cancelled,
+            kind => Phase::Failed(kind, causes(&fault)),
+        },
     }
 }
 
@@ -75,6 +83,15 @@ enum Fault {
     Rounds(#[from] RoundsError),
     #[error("the plan cannot be written down")]
     Json(#[from] serde_json::Error),
+}
+
+impl Fault {
+    fn kind(&self) -> FailureKind {
+        match self {
+            Self::Rounds(error) => error.kind(),
+            Self::Json(_) => FailureKind::Fault,
+        }
+    }
 }
 
 fn solution(solve: &Solve, means: &Means, held: &HeldScene) -> Result<HeldSolution, Fault> {

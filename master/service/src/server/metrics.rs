@@ -210,7 +210,7 @@ impl Metrics {
     pub(super) fn ended(&self, state: &Phase) {
         let outcome = match state {
             Phase::Finished(_) => "finished",
-            Phase::Failed(_) => "failed",
+            Phase::Failed(..) => "failed",
             Phase::Queued | Phase::Running | Phase::Cancelled => "cancelled",
         };
         self.solves.get_or_create(&OfOutcome { outcome }).inc();

@@ -24,6 +24,7 @@ use super::slices;
 use super::solves::{Phase, Solve, Solves, stopping};
 use nestrad_cluster::Cluster;
 use nestrad_cluster::scheduler::WorkerCounts;
+use nestrad_engine::traced::FailureKind;
 
 /// A client that sends nothing for so long in the middle of a scene is given up.
 const SILENCE: Duration = Duration::from_secs(60);
@@ -203,15 +204,20 @@ impl SolveService for Rpc {
     }
 }
 
+fn GiB(bytes: u64) -> f64 {
+    bytes as f64 / (1u64 << 30) as f64
+}
+
 fn worker_info(worker: &WorkerCounts) -> v1::WorkerInfo {
     v1::WorkerInfo {
         name: worker.facts.name.clone(),
         threads: worker.facts.threads,
-        memory_gi_b: worker.facts.memory_bytes as f64 / (1u64 << 30) as f64,
+        memory_gi_b: GiB(worker.facts.memory_bytes),
         leased: worker.leased as u32,
         done: worker.done,
         lost: worker.lost,
         silent_s: worker.silent.as_secs_f64(),
+        needs_memory_gi_b: worker.too_small_for.map(GiB),
     }
 }
 
@@ -289,8 +295,12 @@ async fn tell(
             total: stage.total,
             plan: Vec::new(),
             reason: match &state {
-                Phase::Failed(reason) => reason.clone(),
+                Phase::Failed(_, reason) => reason.clone(),
                 _ => String::new(),
+            },
+            failure: match &state {
+                Phase::Failed(kind, _) => failure(*kind).into(),
+                _ => v1::SolveFailure::Unspecified.into(),
             },
         };
         if !told_plan {
@@ -318,6 +328,16 @@ async fn tell(
             () = tokio::time::sleep(TELL_EVERY) => {}
             () = watcher.closed() => return,
         }
+    }
+}
+
+fn failure(kind: FailureKind) -> v1::SolveFailure {
+    match kind {
+        FailureKind::Input => v1::SolveFailure::Input,
+        FailureKind::Limit => v1::SolveFailure::Limit,
+        FailureKind::Fault => v1::SolveFailure::Fault,
+        // told as a state of its own
+        FailureKind::Cancelled => v1::SolveFailure::Unspecified,
     }
 }
 

@@ -15,6 +15,7 @@ use super::solution::HeldSolution;
 use nestrad_engine::plan::Settings;
 use nestrad_engine::progress::Progress;
 use nestrad_engine::stop::Stop;
+use nestrad_engine::traced::FailureKind;
 
 /// Solves that have ended and are kept, however small their results.
 const MAX_ENDED: usize = 256;
@@ -31,7 +32,7 @@ pub(super) enum Phase {
     Queued,
     Running,
     Finished(Arc<HeldSolution>),
-    Failed(String),
+    Failed(FailureKind, String),
     Cancelled,
 }
 
@@ -45,7 +46,7 @@ impl Phase {
             Self::Queued => v1::SolveState::Queued,
             Self::Running => v1::SolveState::Running,
             Self::Finished(_) => v1::SolveState::Finished,
-            Self::Failed(_) => v1::SolveState::Failed,
+            Self::Failed(..) => v1::SolveState::Failed,
             Self::Cancelled => v1::SolveState::Cancelled,
         }
     }

@@ -114,6 +114,7 @@ pub(crate) fn simulate(recorded: &Recorded, setting: Setting) -> Run {
             Duration::ZERO,
             WorkerFacts {
                 name: String::new(),
+                identity: [0; 32],
                 threads: setting.threads_each,
                 memory_bytes: 1 << 40,
             },
