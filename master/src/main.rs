@@ -14,6 +14,7 @@ use clap::Parser;
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
+    nestrad_engine::heap::settle();
     let command = Cli::parse().command;
     cli::code_of(|| match command {
         Command::Solve(args) => args.run(),

@@ -123,23 +123,6 @@ fn a_round_that_misses_is_followed_by_a_finer_one() {
 }
 
 #[test]
-fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
-    let settings = Settings {
-        budget_s: Some(1e-6),
-        ..asked(0.1)
-    };
-    let accuracy = reach(&maize(1).scene(), &settings).accuracy;
-    assert_eq!(accuracy.ended, Ended::OutOfTime);
-    assert_eq!(accuracy.rounds.len(), 1);
-    assert!(accuracy.rounds[0].reached_percent.unwrap() > 0.1);
-    assert!(
-        accuracy
-            .to_string()
-            .contains("--budget leaves no time for a finer round")
-    );
-}
-
-#[test]
 fn without_memory_the_best_that_fits_has_to_do() {
     let scene = maize(1).scene();
     let settings = Settings {

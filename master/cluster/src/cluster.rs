@@ -88,6 +88,8 @@ pub(crate) struct ClusterState {
     pub(crate) deserted: bool,
     /// What the user may want to know, each once.
     pub(crate) remarks: Vec<String>,
+    /// The master computes by itself: there is no room for workers.
+    pub(crate) alone: bool,
 }
 
 /// A solve at which workers work.
@@ -168,6 +170,7 @@ impl Cluster {
                 closed: false,
                 deserted: false,
                 remarks: Vec::new(),
+                alone: false,
             }),
             changed: Notify::new(),
             joined: Condvar::new(),
@@ -207,6 +210,11 @@ impl Cluster {
     /// What the user may want to know of the workers, each thing once.
     pub fn remarks(&self) -> Vec<String> {
         self.lock().remarks.clone()
+    }
+
+    /// Says whether the master is to compute by itself from now on, or workers for it.
+    pub fn set_alone(&self, alone: bool) {
+        self.lock().alone = alone;
     }
 
     /// Whether anybody is there to compute.

@@ -126,6 +126,9 @@ fn command(program: &PathBuf, door: &Door, share: Share, k: u32) -> Command {
 /// Ends processes: those that do not end in time by themselves are killed.
 fn stop(mut children: Vec<Child>, patience: Duration) {
     let begun = Instant::now();
+    for child in &mut children {
+        drop(child.stdin.take());
+    }
     loop {
         children.retain_mut(|child| matches!(child.try_wait(), Ok(None)));
         if children.is_empty() || begun.elapsed() >= patience {

@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use nestrad_engine::exchange::{
     BlockOf, ExchangeError, JobCounts, JobRows, Ready, RowSource, Sampling, SmallestWorker, Take,
-    Work, partition,
+    ThisProcess, Work, partition,
 };
 use nestrad_engine::frame::Frame;
 use nestrad_engine::run::Run;
@@ -26,12 +26,15 @@ const PAUSE: Duration = Duration::from_millis(100);
 
 impl RowSource for Cluster {
     fn is_elsewhere(&self) -> bool {
-        true
+        !self.lock().alone
     }
 
     /// Waits for the first worker, which may come at any time. Blocks fit every worker that is large enough for the
     /// smallest of them; where none is, and where nobody comes, it is the master that has to do.
     fn cut(&self, frame: &Frame, sampling: &Sampling, run: &Run) -> Result<Work, ExchangeError> {
+        if !self.is_elsewhere() {
+            return ThisProcess::default().cut(frame, sampling, run);
+        }
         run.progress.stage("waiting for a worker", 0);
         let sizes = self.sizes(run.stop)?;
         self.0.compute.install(|| {
@@ -49,6 +52,9 @@ impl RowSource for Cluster {
         take: &mut Take<'_>,
         run: &Run,
     ) -> Result<JobCounts, ExchangeError> {
+        if !self.is_elsewhere() {
+            return ThisProcess::default().trace(frame, work, wanted, take, run);
+        }
         let mut running = self.begin(frame, work, wanted)?;
         for _ in wanted {
             let (job, rows) = running.next(run.stop)?;

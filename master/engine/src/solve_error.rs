@@ -101,7 +101,10 @@ impl PlanError {
     /// Its kind.
     pub fn kind(&self) -> FailureKind {
         match self {
-            Self::Memory { .. } | Self::Elements { .. } => FailureKind::Limit,
+            Self::Memory { .. }
+            | Self::Elements { .. }
+            | Self::Time { .. }
+            | Self::Overtime { .. } => FailureKind::Limit,
             Self::Accuracy { .. }
             | Self::Overhang { .. }
             | Self::Narrow { .. }

@@ -122,7 +122,7 @@ impl TracedCanopy {
             Some(sampling) => Ok(Some(Exchange::trace(&frame, sampling, rows, run)?)),
             None => Ok(None),
         };
-        let is_elsewhere = rows.is_elsewhere() && plan.sampling.is_some();
+        let is_elsewhere = rows.is_elsewhere() && plan.sampling.is_some() && !plan.in_turn;
         let ((done, far), exchange) = if is_elsewhere {
             at_once(run, |run| here(run, watch), there)?
         } else {

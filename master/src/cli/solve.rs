@@ -85,11 +85,15 @@ struct HowFlags {
     /// Longest time of the solve, seconds: it stops with the smallest error that it can reach in that time, and
     /// says which
     ///
-    /// Results then depend on how fast the machine is.
+    /// A solve that even its coarsest plan cannot do in that time is refused before it starts. Reading and writing
+    /// files comes besides. Results then depend on how fast the machine is.
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     budget: Option<f64>,
 
-    /// Memory that the solve may take, GiB [default: 8]
+    /// Memory that the solve may take, GiB, with its local workers [default: 8]
+    ///
+    /// Where it is short, the finest plan that fits is carried out, and the plan says what is coarser. A solve that
+    /// even its coarsest plan does not fit is refused.
     #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
     memory: Option<f64>,
 
@@ -218,7 +222,6 @@ impl Task {
 
     /// The same as a master gives back, computed here: what it took is in `watch`.
     fn compute(&self, scene: &Scene, watch: &mut Stopwatch) -> Result<SolvedThere> {
-        let begins = |plan: &Plan, before: &[Round]| self.begins(plan, before);
         let progress = Arc::new(Progress::default());
         let bar = Bar::of(&progress, self.notes.quiet);
         let run = Run {
@@ -228,6 +231,12 @@ impl Task {
         let kept = self.state.open()?;
         let crew = self.workers.crew(self.settings.memory_GiB, self.notes)?;
         let workers = crew.as_ref().map(Crew::cluster);
+        let begins = |plan: &Plan, before: &[Round]| {
+            self.begins(plan, before);
+            if let Some(crew) = &crew {
+                crew.begin_round(plan);
+            }
+        };
         let solved = with_rows(workers, kept.as_ref(), |rows| {
             solve_in_rounds(scene, &self.settings, rows, &run, watch, begins)
         });

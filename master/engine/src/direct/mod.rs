@@ -72,7 +72,7 @@ pub struct Direct {
 
 /// Sources are worked off in this many groups, an even number, each in order, which are then added in order: so the
 /// result does not depend on the number of threads.
-const GROUPS: usize = 8;
+pub(crate) const GROUPS: usize = 8;
 
 /// Projects every source on a frame, with optics in its order. `line_area_m2` holds, per source, the cross-section
 /// of a line (m²); `step` is asked before each of them.

@@ -61,7 +61,7 @@ impl FarRows {
         let half = |h: usize| {
             let batches = h * HALF_BATCHES..(h + 1) * HALF_BATCHES;
             let batches: Vec<BatchRows> = batches.map(batch).collect::<Result<_, _>>()?;
-            Ok::<_, ExchangeError>(HalfRows::join(&batches))
+            Ok::<_, ExchangeError>(HalfRows::join(batches))
         };
         Ok(Self {
             halves: [half(0)?, half(1)?],

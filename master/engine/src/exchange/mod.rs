@@ -75,14 +75,11 @@ impl Exchange {
 
     /// Joins all batches.
     fn of_batches(mut batches: Vec<BatchRows>, counts: Counts, jobs: JobCounts) -> Self {
-        let mut halves = [HalfRows::default(), HalfRows::default()];
         // each half's batches are freed before the other half is joined
         let second = batches.split_off(batches.len() / 2);
-        halves[0] = HalfRows::join(&batches);
-        drop(batches);
-        halves[1] = HalfRows::join(&second);
+        let first = HalfRows::join(batches);
         Self {
-            halves,
+            halves: [first, HalfRows::join(second)],
             counts,
             jobs,
         }
