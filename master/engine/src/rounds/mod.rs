@@ -202,6 +202,11 @@ pub fn light_in_rounds(
     }
 }
 
+/// The plan that a solve begins with: whatever refuses a solve before anything is computed refuses this.
+pub fn first_plan(scene: &Scene, settings: &Settings) -> Result<Plan, RoundsError> {
+    Ok(first(scene, settings)?.1)
+}
+
 /// The first round: what is asked for, or a coarse look where that saves.
 fn first(scene: &Scene, settings: &Settings) -> Result<(Sources, Plan), PlanError> {
     let aims = Aims::of(settings.accuracy_percent);
