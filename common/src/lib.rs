@@ -9,6 +9,7 @@
 )]
 
 pub mod assemble;
+pub mod bounded;
 pub mod canopy;
 pub mod figures;
 pub mod formats;

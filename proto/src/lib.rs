@@ -32,3 +32,6 @@ pub const MAX_MESSAGE_BYTES: usize = 8 << 20;
 
 /// The largest slice of something that travels in slices, bytes, about.
 pub const SLICE_BYTES: usize = 512 << 10;
+
+/// The metadata of an error that goes away: after so many seconds the same call may succeed.
+pub const RETRY_AFTER: &str = "retry-after";

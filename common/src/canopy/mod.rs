@@ -18,6 +18,9 @@ pub use mesh::{Mesh, Triangle};
 pub use solids::Solids;
 pub use weld::Welder;
 
+/// Longest name of an organ, plant, species, material or band, bytes.
+pub const MAX_NAME_BYTES: usize = 4096;
+
 /// A canopy ready to be computed: checked, in metres, moved to a local origin.
 ///
 /// Conventions: z up; the *upper* face of a triangle is the one that the right-hand normal

@@ -163,6 +163,7 @@ fn of_kind(kind: FailureKind) -> Exit {
 fn of_remote(error: &RemoteError) -> Exit {
     match error {
         RemoteError::Refused { kind, .. } => of_refusal(*kind),
+        RemoteError::Busy { .. } => Exit::Limit,
         RemoteError::Lost { .. } => Exit::Master,
         RemoteError::Failed { kind, .. } => of_kind(*kind),
         RemoteError::Cancelled => Exit::Cancelled,

@@ -11,6 +11,7 @@ mod record;
 mod remote;
 mod report;
 mod serve;
+mod settings;
 mod solve;
 mod state;
 mod status;

@@ -60,7 +60,7 @@ struct LimitFlags {
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u8>(1..=255), allow_negative_numbers = true)]
     solves: u8,
 
-    /// Solves that may wait
+    /// Solves that may wait; of one client, half of what the others leave
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole::<u32>(0..=u32::MAX.into()), allow_negative_numbers = true)]
     queue: u32,
 
@@ -68,11 +68,12 @@ struct LimitFlags {
     #[arg(long, value_name = "GIB", default_value_t = 8.0, value_parser = positive)]
     memory: f64,
 
-    /// Memory for scenes that are held, GiB; where it is full, the scene that was unused for longest is dropped
+    /// Memory for scenes that are held, GiB; where it is full, the client with the most loses the scene that it did not
+    /// use for longest
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     scene_memory: f64,
 
-    /// Memory for results that are held, GiB; where it is full, the oldest are dropped
+    /// Memory for results that are held, GiB; where it is full, new solves are refused until results were fetched
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     result_memory: f64,
 

@@ -19,7 +19,7 @@ use nestrad_engine::run::Run;
 use nestrad_engine::stop::Stop;
 use nestrad_engine::stopwatch::{Stage, Stopwatch, Usage};
 use nestrad_results::summary::Summary;
-use nestrad_results::{Formats, check_writable, stage, terminal};
+use nestrad_results::{Formats, check_place, stage, terminal};
 use nestrad_service::client::SolvedThere;
 use rayon::ThreadPoolBuilder;
 use serde::Deserialize;
@@ -31,6 +31,7 @@ use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
 use super::record::OptionsRecord;
 use super::remote::MasterFlags;
+use super::settings::settings;
 use super::state::StateFlags;
 use super::workers::{Crew, WorkersFlags};
 
@@ -138,6 +139,15 @@ enum EstimatorFlag {
     Rays,
 }
 
+impl From<EstimatorFlag> for Estimator {
+    fn from(flag: EstimatorFlag) -> Self {
+        match flag {
+            EstimatorFlag::Lines => Self::Lines,
+            EstimatorFlag::Rays => Self::Rays,
+        }
+    }
+}
+
 impl SolveArgs {
     fn options(&self) -> Options {
         let Self { how, results, .. } = self;
@@ -156,7 +166,7 @@ impl SolveArgs {
         let options = self.options();
         let inputs = self.scene.inputs(options)?;
         let task = Task {
-            settings: settings(&inputs.options, &self.how),
+            settings: settings(&inputs.options, self.how.budget, self.how.estimator.into()),
             notes: Notes {
                 quiet: self.results.quiet,
             },
@@ -170,22 +180,6 @@ impl SolveArgs {
         let pool = ThreadPoolBuilder::new().num_threads(threads).build();
         pool.context("cannot start threads")?
             .install(|| task.solve())
-    }
-}
-
-fn settings(options: &Options, how: &HowFlags) -> Settings {
-    let default = Settings::default();
-    Settings {
-        diameter: options.diameter.unwrap_or(default.diameter),
-        accuracy_percent: options.accuracy_percent.unwrap_or(default.accuracy_percent),
-        in_rounds: options.accuracy_percent.or(how.budget).is_some(),
-        budget_s: how.budget,
-        memory_GiB: options.memory_GiB.unwrap_or(default.memory_GiB),
-        seed: options.seed.unwrap_or(default.seed),
-        estimator: match how.estimator {
-            EstimatorFlag::Lines => Estimator::Lines,
-            EstimatorFlag::Rays => Estimator::Rays,
-        },
     }
 }
 
@@ -203,9 +197,9 @@ struct Task {
 impl Task {
     fn solve(&self) -> Result<()> {
         let mut watch = Stopwatch::start();
-        let Loaded { scene, inspection } = self.load()?;
         // before the work, not after it
-        check_writable(&self.out)?;
+        check_place(&self.out)?;
+        let Loaded { scene, inspection } = self.load()?;
         watch.lap("input");
         let solved = match &self.place.master {
             None => self.compute(&scene, &mut watch)?,

@@ -12,12 +12,11 @@ use nestrad_engine::plan::Settings;
 use nestrad_engine::progress::Progress;
 use nestrad_engine::run::Run;
 use nestrad_engine::stop::Stop;
-use nestrad_results::check_writable;
 use nestrad_results::trade::request::Request;
 use nestrad_results::trade::setting::grid;
 use nestrad_results::trade::study::carry_out;
 use nestrad_results::trade::table::Comparison;
-use nestrad_results::trade::{About, write};
+use nestrad_results::trade::{About, check_place, write};
 use rayon::ThreadPoolBuilder;
 
 use super::bar::Bar;
@@ -97,11 +96,12 @@ impl HowFlags {
         let notes = Notes { quiet: self.quiet };
         let default = Settings::default();
         let seed = inputs.options.seed.unwrap_or(default.seed);
+        // before the work, not after it
+        check_place(&self.out)?;
         let loaded = assemble::load(inputs)?;
         for warning in &loaded.inspection.warnings {
             notes.say("warning", warning);
         }
-        check_writable(&self.out)?;
         let settings = grid(&loaded.scene.canopy, self.finest);
         let request = Request {
             scene: &loaded.scene,

@@ -13,6 +13,8 @@ mod light;
 mod limits;
 mod many_solves;
 mod missed;
+mod neighbours;
+mod numbers;
 mod python;
 mod results;
 mod stopping;

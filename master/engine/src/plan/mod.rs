@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use nestrad_common::canopy::Canopy;
 use nestrad_common::light::Sources;
-use nestrad_common::options::Diameter;
+use nestrad_common::options::{DEFAULT_MEMORY_GIB, Diameter};
 use nestrad_kernel::elements::Elements;
 use nestrad_kernel::far_grid::{Levels, SharedFarGrid};
 use nestrad_kernel::lattice::Extent;
@@ -77,7 +77,7 @@ impl Default for Settings {
             accuracy_percent: DEFAULT_ACCURACY_PERCENT,
             in_rounds: false,
             budget_s: None,
-            memory_GiB: 8.0,
+            memory_GiB: DEFAULT_MEMORY_GIB,
             seed: 1,
             estimator: Estimator::default(),
         }

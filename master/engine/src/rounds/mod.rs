@@ -234,6 +234,12 @@ pub fn light_in_rounds(
     }
 }
 
+/// The plan that a solve begins with: whatever refuses a solve before anything is computed refuses this.
+pub fn first_plan(scene: &Scene, settings: &Settings) -> Result<Plan, RoundsError> {
+    let clock = settings.budget_s.map(Clock::start);
+    Ok(first(scene, settings, clock.as_ref())?.1)
+}
+
 /// The better of two rounds, where a limit shaped the later one: it may have been worse. What ended it all is that of
 /// the later one.
 fn better_of(before: Solved, after: Solved) -> Solved {

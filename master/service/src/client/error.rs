@@ -17,6 +17,16 @@ pub enum RemoteError {
         /// What kind of refusal it is.
         kind: RefusalKind,
     },
+    /// The master had no room, for as long as one waits for it.
+    #[error("the master cannot {doing}: {message}; it had no room for {waited_s} s")]
+    Busy {
+        /// What it was asked for.
+        doing: &'static str,
+        /// What it said last.
+        message: String,
+        /// For how long it was asked.
+        waited_s: u64,
+    },
     /// The master is not there.
     #[error("the master cannot be reached: {message}")]
     Lost {

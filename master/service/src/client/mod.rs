@@ -2,7 +2,8 @@
 //! the same to the last bit as if they were computed here.
 //!
 //! A master that is lost is looked for again; one that has forgotten scene or solve (it was started
-//! anew, or had no room) gets them once more. Both end after a time, or after a few rounds.
+//! anew, or had no room) gets them once more. Both end after a time, or after a few rounds. One that has no room for
+//! the scene or the solve is asked again when it says, for a longer time.
 
 mod error;
 mod results;
@@ -18,7 +19,7 @@ use nestrad_engine::progress::StageProgress;
 use nestrad_engine::traced::FailureKind;
 use nestrad_proto::channel::Authorized;
 use nestrad_proto::v1::solve_service_client::SolveServiceClient;
-use nestrad_proto::{MAX_MESSAGE_BYTES, v1};
+use nestrad_proto::{MAX_MESSAGE_BYTES, RETRY_AFTER, v1};
 use tokio::time::{sleep, timeout};
 use tonic::{Code, Status};
 
@@ -31,6 +32,12 @@ const FIRST_PATIENCE: Duration = Duration::from_secs(10);
 
 /// A master that was reached is given up when it was away for so long.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A master that has no room is asked for so long. Longer than it keeps results that nobody fetches.
+const BUSY_PATIENCE: Duration = Duration::from_secs(15 * 60);
+
+/// It is asked again after this at most, whatever it says.
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// Pause between two tries.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -76,8 +83,10 @@ pub async fn solve(
         scene,
         options: options(settings),
         geometry_id: None,
+        scene_id: None,
         solve_id: None,
         heard: None,
+        busy: None,
         rounds: 0,
     };
     tokio::select! {
@@ -125,9 +134,12 @@ struct Session {
     scene: Scene,
     options: v1::SolveOptions,
     geometry_id: Option<String>,
+    scene_id: Option<String>,
     solve_id: Option<String>,
     /// When the master last answered.
     heard: Option<Instant>,
+    /// Since when it has had no room.
+    busy: Option<Instant>,
     /// How often it took the scene, or was about to give the results.
     rounds: u32,
 }
@@ -138,6 +150,12 @@ enum Setback {
     Away(Status),
     /// The master does not know what it was asked for: tell it again.
     Forgotten(Status),
+    /// The master has no room: ask again after a while.
+    Busy {
+        doing: &'static str,
+        status: Status,
+        wait: Duration,
+    },
     /// Trying again is of no use.
     Final(RemoteError),
 }
@@ -151,13 +169,26 @@ impl From<RemoteError> for Setback {
 impl Session {
     async fn solve(&mut self, tell: &mut impl FnMut(Event)) -> Result<SolvedThere, RemoteError> {
         let begun = Instant::now();
-        let mut told = false;
+        let (mut told, mut told_busy) = (false, false);
         loop {
             let status = match self.attempt(tell).await {
                 Ok(solved) => return Ok(solved),
                 Err(Setback::Final(error)) => return Err(error),
+                Err(Setback::Busy {
+                    doing,
+                    status,
+                    wait,
+                }) => {
+                    self.wait(doing, &status, wait, |note| {
+                        if !std::mem::replace(&mut told_busy, true) {
+                            tell(Event::Note(note));
+                        }
+                    })
+                    .await?;
+                    continue;
+                }
                 Err(Setback::Forgotten(status)) => {
-                    self.solve_id = None;
+                    (self.scene_id, self.solve_id) = (None, None);
                     status
                 }
                 Err(Setback::Away(status)) => status,
@@ -180,13 +211,51 @@ impl Session {
         }
     }
 
+    /// Waits for a master that has no room, if it is not asked for too long.
+    async fn wait(
+        &mut self,
+        doing: &'static str,
+        status: &Status,
+        wait: Duration,
+        tell: impl FnOnce(String),
+    ) -> Result<(), RemoteError> {
+        let since = *self.busy.get_or_insert_with(Instant::now);
+        // what it forgets meanwhile is no fault of its
+        self.rounds = 0;
+        // clients that were refused together do not come back together
+        let apart = Duration::from_millis(u64::from(std::process::id() % 1000));
+        let wait = wait.min(LONGEST_PAUSE) + apart;
+        let message = status.message().to_owned();
+        if since.elapsed() + wait > BUSY_PATIENCE {
+            let waited_s = since.elapsed().as_secs();
+            return Err(RemoteError::Busy {
+                doing,
+                message,
+                waited_s,
+            });
+        }
+        let minutes = BUSY_PATIENCE.as_secs() / 60;
+        tell(format!(
+            "the master has no room ({message}): trying again for {minutes} minutes"
+        ));
+        sleep(wait).await;
+        Ok(())
+    }
+
     async fn attempt(&mut self, tell: &mut impl FnMut(Event)) -> Result<SolvedThere, Setback> {
         let solve_id = match &self.solve_id {
             Some(id) => id.clone(),
             None => {
-                let scene_id = self.upload().await?;
-                self.rounds += 1;
+                let scene_id = match &self.scene_id {
+                    Some(id) => id.clone(),
+                    None => {
+                        let id = self.upload().await?;
+                        self.rounds += 1;
+                        self.scene_id.insert(id).clone()
+                    }
+                };
                 let id = self.start(scene_id).await?;
+                self.busy = None;
                 self.solve_id.insert(id).clone()
             }
         };
@@ -330,11 +399,27 @@ impl Session {
                 self.heard = Some(Instant::now());
                 Setback::Forgotten(status)
             }
-            _ => Setback::Final(RemoteError::Refused {
-                doing,
-                kind: RefusalKind::of(status.code()),
-                message: status.message().to_owned(),
-            }),
+            _ => match retry_after(&status) {
+                Some(wait) => {
+                    self.heard = Some(Instant::now());
+                    Setback::Busy {
+                        doing,
+                        status,
+                        wait,
+                    }
+                }
+                None => Setback::Final(RemoteError::Refused {
+                    doing,
+                    kind: RefusalKind::of(status.code()),
+                    message: status.message().to_owned(),
+                }),
+            },
         }
     }
+}
+
+/// When a master that has no room wants to be asked again, if it says so.
+fn retry_after(status: &Status) -> Option<Duration> {
+    let seconds = status.metadata().get(RETRY_AFTER)?.to_str().ok()?;
+    seconds.parse().ok().map(Duration::from_secs)
 }

@@ -18,7 +18,8 @@ use thiserror::Error;
 use super::metrics::Metrics;
 use super::scenes::HeldScene;
 use super::solution::HeldSolution;
-use super::solves::{Phase, Solve, Solves};
+use super::solve::{Phase, Solve};
+use super::solves::Solves;
 
 /// What a master computes with.
 pub(super) struct Means<'a> {

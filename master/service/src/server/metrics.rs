@@ -13,7 +13,7 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 
-use super::solves::Phase;
+use super::solve::Phase;
 use nestrad_cluster::ClusterStatus;
 
 /// Rates are means over this time.

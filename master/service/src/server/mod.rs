@@ -4,7 +4,9 @@
 //! Calls are answered on tokio's threads; what takes time is done on threads of its own and rayon's.
 //! Everything that a caller chooses the size of is bounded: see [`ServiceLimits`].
 
+mod admission;
 mod budget;
+mod caller;
 mod compute;
 mod connection;
 mod error;
@@ -16,9 +18,12 @@ mod metrics;
 mod rpc;
 mod scenes;
 mod serve;
+mod share;
 mod slices;
 mod solution;
+mod solve;
 mod solves;
+mod uploads;
 
 pub use error::{ErrorCode, ServiceError};
 pub use limits::ServiceLimits;

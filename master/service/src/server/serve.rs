@@ -15,17 +15,19 @@ use nestrad_proto::{DESCRIPTORS, MAX_MESSAGE_BYTES};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use thiserror::Error;
 use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 use tonic_health::server::HealthReporter;
 
+use super::admission::Bounds;
 use super::compute::{self, Means};
 use super::connection::incoming;
 use super::limits::ServiceLimits;
 use super::metrics::{Metrics, Now};
-use super::rpc::{Rpc, UPLOADS};
+use super::rpc::Rpc;
 use super::scenes::Scenes;
-use super::solves::{Phase, Solves};
+use super::solve::Phase;
+use super::solves::Solves;
+use super::uploads::Uploads;
 
 /// Time for clients to come for what has just finished, and to hang up, when the master stops.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -77,10 +79,15 @@ impl Service {
             .num_threads(threads)
             .thread_name(named)
             .build()?;
+        let bounds = Bounds {
+            queue: limits.queue,
+            result_bytes: limits.result_bytes,
+            scene_bytes: limits.scene_bytes,
+        };
         Ok(Self {
             limits,
             scenes: Arc::new(Scenes::new(limits.scene_bytes)),
-            solves: Arc::new(Solves::new(limits.queue, limits.result_bytes)),
+            solves: Arc::new(Solves::new(bounds, limits.solves.max(1))),
             metrics: Arc::default(),
             pool: Arc::new(pool),
             workers: Cluster::start(workers, threads)?,
@@ -110,7 +117,7 @@ impl Service {
             scenes: self.scenes.clone(),
             solves: self.solves.clone(),
             metrics: self.metrics.clone(),
-            uploads: Semaphore::new(UPLOADS),
+            uploads: Uploads::new(),
             workers: self.workers.clone(),
             most_GiB: self.limits.solve_GiB,
             started: self.started,
