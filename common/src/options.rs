@@ -7,6 +7,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::threads::MOST_THREADS;
+
 /// The options of a solve, each of them optional: the defaults are the plan's.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,7 +46,7 @@ impl Options {
         }
     }
 
-    /// Refuses an accuracy or a memory that is not above zero.
+    /// Refuses an accuracy or a memory that is not above zero, and more threads than any machine has.
     pub fn check(&self) -> Result<(), OptionFault> {
         for (name, value) in [
             ("accuracy", self.accuracy_percent),
@@ -59,6 +61,15 @@ impl Options {
                     found: value.to_string(),
                 });
             }
+        }
+        if let Some(threads) = self.threads
+            && threads > MOST_THREADS
+        {
+            return Err(OptionFault {
+                option: "threads",
+                expected: "a whole number from 0 to 4096",
+                found: threads.to_string(),
+            });
         }
         Ok(())
     }

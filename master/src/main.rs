@@ -14,7 +14,10 @@ use clap::Parser;
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
-    let command = Cli::parse().command;
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(usage) => return cli::code_of(|| Err(usage.into())),
+    };
     cli::code_of(|| match command {
         Command::Solve(args) => args.run(),
         Command::Check(args) => args.run(),

@@ -9,6 +9,7 @@ use nestrad_common::inspection::{Inspection, MaterialFacts, SunFacts};
 use nestrad_common::light::Light;
 use nestrad_common::optics::{FaceOptics, Optics};
 use nestrad_common::options::Options;
+use nestrad_common::printable;
 
 use super::console::{self, Notes};
 use super::flags::SceneFlags;
@@ -67,6 +68,7 @@ struct Facts(String);
 
 impl Facts {
     fn line(&mut self, what: &str, text: &str) {
+        let text = printable::line(text);
         self.0.push_str(&format!("{what:<10}{text}\n"));
     }
 

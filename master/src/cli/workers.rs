@@ -8,6 +8,7 @@ use clap::Args;
 use nestrad_cluster::door::Door;
 use nestrad_cluster::local::{LocalWorkers, Share};
 use nestrad_cluster::{Cluster, WorkerLimits};
+use nestrad_common::threads::{self, FOR_EACH_PROCESSOR, Threads};
 use nestrad_proto::access::Access;
 
 use super::console::Notes;
@@ -68,7 +69,18 @@ impl WorkersFlags {
         if self.listen.is_some() {
             notes.say("workers", &format!("may join at {}", door.address()));
         }
-        let start = |workers| {
+        let start = |workers: u32| {
+            let most = Threads::asked(workers as usize);
+            if most.warning.is_some() {
+                let processors = threads::processors();
+                let line = format!(
+                    "{workers} workers are more than {FOR_EACH_PROCESSOR} for each of {processors} processors: {} are \
+                     started",
+                    most.count
+                );
+                notes.say("warning", &line);
+            }
+            let workers = most.count as u32;
             let threads = threads as u32;
             let share = Share {
                 workers,

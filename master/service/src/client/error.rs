@@ -17,6 +17,12 @@ pub enum RemoteError {
         /// What kind of refusal it is.
         kind: RefusalKind,
     },
+    /// The master, or this client, is not who the other expects.
+    #[error("{message}")]
+    Credentials {
+        /// Whose certificate is refused, and why.
+        message: String,
+    },
     /// The master is not there.
     #[error("the master cannot be reached: {message}")]
     Lost {

@@ -6,21 +6,23 @@
 
 mod budget;
 mod compute;
-mod connection;
 mod error;
 mod held;
 mod identity;
 mod intake;
 mod limits;
 mod metrics;
+mod metrics_port;
 mod rpc;
 mod scenes;
 mod serve;
 mod slices;
 mod solution;
 mod solves;
+mod supervisor;
 
 pub use error::{ErrorCode, ServiceError};
 pub use limits::ServiceLimits;
 pub use metrics::Metrics;
-pub use serve::{ServeError, Service, serve_metrics};
+pub use serve::{ServeError, Service};
+pub use supervisor::Fault;

@@ -1,6 +1,8 @@
 //! The solves that the master knows: those that wait, those that are computed, and what came of the
 //! others. Of bounded number and size; of what has ended, the oldest goes first.
 
+mod solver;
+
 use std::collections::VecDeque;
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant, SystemTime};
@@ -16,6 +18,8 @@ use nestrad_engine::plan::Settings;
 use nestrad_engine::progress::Progress;
 use nestrad_engine::stop::Stop;
 use nestrad_engine::traced::FailureKind;
+
+pub(super) use solver::Solver;
 
 /// Solves that have ended and are kept, however small their results.
 const MAX_ENDED: usize = 256;
@@ -167,6 +171,8 @@ struct Known {
     /// Oldest first.
     solves: VecDeque<Arc<Solve>>,
     stopping: bool,
+    /// Threads that compute.
+    solvers: usize,
 }
 
 impl Solves {
@@ -226,7 +232,7 @@ impl Solves {
     }
 
     /// The next solve to compute; waits for it. None when the master stops.
-    pub(super) fn next(&self) -> Option<Arc<Solve>> {
+    fn next(&self) -> Option<Arc<Solve>> {
         let mut known = self.lock();
         loop {
             if let Some(solve) = known.waiting().next().cloned() {
@@ -245,7 +251,7 @@ impl Solves {
     }
 
     /// What came of a solve that was computed.
-    pub(super) fn ended(&self, solve: &Solve, state: Phase) {
+    fn ended(&self, solve: &Solve, state: Phase) {
         let mut known = self.lock();
         solve.end(state);
         self.forget(&mut known);
