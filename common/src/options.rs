@@ -7,6 +7,8 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::threads::MOST_THREADS;
+
 /// Memory that a solve may take where nothing is said, GiB.
 pub const DEFAULT_MEMORY_GIB: f64 = 8.0;
 
@@ -47,13 +49,22 @@ impl Options {
         }
     }
 
-    /// Refuses an accuracy or a memory that is not above zero.
+    /// Refuses an accuracy or a memory that is not above zero, and more threads than any machine has.
     pub fn check(&self) -> Result<(), OptionFault> {
         for (name, value) in [
             ("accuracy", self.accuracy_percent),
             ("memory", self.memory_GiB),
         ] {
             value.map_or(Ok(0.0), |value| above_zero(name, value))?;
+        }
+        if let Some(threads) = self.threads
+            && threads > MOST_THREADS
+        {
+            return Err(OptionFault {
+                option: "threads",
+                expected: "a whole number from 0 to 4096",
+                found: threads.to_string(),
+            });
         }
         Ok(())
     }

@@ -15,7 +15,10 @@ use cli::{Cli, Command};
 
 fn main() -> ExitCode {
     nestrad_engine::heap::settle();
-    let command = Cli::parse().command;
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(usage) => return cli::code_of(|| Err(usage.into())),
+    };
     cli::code_of(|| match command {
         Command::Solve(args) => args.run(),
         Command::Check(args) => args.run(),

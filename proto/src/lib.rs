@@ -1,5 +1,6 @@
 //! The messages that master, workers and clients exchange, generated from `nestrad/v1/*.proto`, which
-//! documents them field by field, and the channels that they travel on.
+//! documents them field by field, and the channels that they travel on. And what master and worker have in common as
+//! processes: the [`log`], and what is said of their [`usage`].
 //!
 //! This crate may import the kernel and `nestrad-common`; [`near_field`] turns their types into messages and back.
 
@@ -8,10 +9,14 @@
 pub mod access;
 pub mod authority;
 pub mod channel;
+pub mod connections;
 pub mod guard;
+pub mod log;
 mod mesh;
 pub mod near_field;
+pub mod reason;
 pub mod token;
+pub mod usage;
 
 /// Version 1 of the protocol.
 pub mod v1 {

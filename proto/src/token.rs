@@ -64,6 +64,11 @@ impl Token {
         given.is_some_and(|given| bool::from(given.ct_eq(self.0.as_bytes())))
     }
 
+    /// Whether it is the same as another.
+    pub(crate) fn is_same_as(&self, other: &Self) -> bool {
+        bool::from(self.0.as_bytes().ct_eq(other.0.as_bytes()))
+    }
+
     /// The value of the header `authorization`, which is kept out of logs.
     pub(crate) fn header(&self) -> Result<MetadataValue<Ascii>, TokenFault> {
         let mut value: MetadataValue<Ascii> = format!("Bearer {}", self.0)

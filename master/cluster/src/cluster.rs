@@ -156,8 +156,8 @@ impl fmt::Debug for Cluster {
 
 impl Cluster {
     /// A cluster without workers, that checks and joins rows on so many threads, 0 for one per
-    /// processor. To be called within a tokio runtime.
-    pub fn start(limits: WorkerLimits, threads: usize) -> Result<Self, ThreadPoolBuildError> {
+    /// processor. Somebody is to [keep watch](Self::keep_watch) over it.
+    pub fn new(limits: WorkerLimits, threads: usize) -> Result<Self, ThreadPoolBuildError> {
         let compute = ThreadPoolBuilder::new().num_threads(threads).build()?;
         // what a master before this one gave out is not to be taken for this one's
         let first_id = RandomState::new().hash_one(Instant::now()) >> 1;
@@ -180,8 +180,12 @@ impl Cluster {
             totals: Totals::default(),
             limits,
         });
-        tokio::spawn(watch(Arc::downgrade(&shared)));
         Ok(Self(shared))
+    }
+
+    /// Takes back what is overdue, for as long as there is a cluster.
+    pub fn keep_watch(&self) -> impl Future<Output = ()> + Send + use<> {
+        watch(Arc::downgrade(&self.0))
     }
 
     /// Tells all workers to leave as soon as they ask for a job.
@@ -273,7 +277,6 @@ impl ClusterState {
 /// How often it is looked whether leases are overdue, or jobs take too long.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Takes back what is overdue, for as long as there is a cluster.
 async fn watch(cluster: Weak<Shared>) {
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);

@@ -4,6 +4,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
+use nestrad_common::panics;
 use nestrad_engine::exchange::JobRows;
 use nestrad_kernel::packed::Shape;
 use nestrad_proto::MAX_MESSAGE_BYTES;
@@ -293,8 +294,13 @@ impl Cluster {
             let (sender, checked) = oneshot::channel();
             let (cluster, compute_s) = (self.clone(), header.compute_s);
             self.0.compute.spawn(move || {
-                let rows = receive::check_body(&header, body, &expected);
-                let used = rows.map(|rows| cluster.hand_on(worker, lease, compute_s, rows));
+                let used = panics::caught(|| {
+                    let rows = receive::check_body(&header, body, &expected);
+                    rows.map(|rows| cluster.hand_on(worker, lease, compute_s, rows))
+                });
+                // a fault of the program is that of this result, not the end of the master
+                let fault = |panic| Err(Status::internal(format!("internal fault: {panic}")));
+                let used = used.unwrap_or_else(fault);
                 // nobody listens where the worker is gone
                 let _ = sender.send(used);
             });

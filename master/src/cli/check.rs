@@ -10,6 +10,7 @@ use nestrad_common::inspection::{Inspection, MaterialFacts, SunFacts};
 use nestrad_common::light::{Light, Source};
 use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
 use nestrad_common::options::Options;
+use nestrad_common::printable;
 use nestrad_common::scene::Scene;
 use nestrad_engine::plan::Estimator;
 use nestrad_engine::rounds::first_plan;
@@ -115,6 +116,7 @@ struct Facts(String);
 
 impl Facts {
     fn line(&mut self, what: &str, text: &str) {
+        let text = printable::line(text);
         self.0.push_str(&format!("{what:<10}{text}\n"));
     }
 

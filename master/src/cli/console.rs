@@ -3,11 +3,14 @@
 use std::io::{self, ErrorKind, Write};
 
 use anyhow::{Context, Result};
+use nestrad_common::printable;
 
 /// Writes to stdout. A reader that has seen enough (`nestrad check ... | head`) is no error.
 pub(crate) fn print(text: &[u8]) -> Result<()> {
+    let text = String::from_utf8_lossy(text);
     let mut out = io::stdout().lock();
-    match out.write_all(text).and_then(|()| out.flush()) {
+    let written = out.write_all(printable::lines(&text).as_bytes());
+    match written.and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(error).context("cannot write to stdout")
         }
@@ -22,6 +25,13 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
+    /// Shows a table of results that are written already: a stdout that takes nothing does not undo them.
+    pub(crate) fn show(self, table: &[u8]) {
+        if let Err(error) = print(table) {
+            self.say("warning", &format!("{error:#}: the table is not shown"));
+        }
+    }
+
     pub(crate) fn say(self, what: &str, line: &str) {
         if !self.quiet {
             note(what, line);
@@ -29,10 +39,11 @@ impl Notes {
     }
 }
 
-/// A line on stderr.
-pub(super) fn note(what: &str, line: &str) {
+/// A remark or an error. Whatever comes from a file or a peer is cleaned here.
+pub(super) fn note(what: &str, text: &str) {
+    let text = printable::line(text);
     // nothing can be done about a stderr that is gone
-    let _ = writeln!(io::stderr().lock(), "{what}: {line}");
+    let _ = writeln!(io::stderr().lock(), "{what}: {text}");
 }
 
 /// An error and its causes in one line. Where a message says what its cause says too, it is said once.

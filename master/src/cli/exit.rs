@@ -16,6 +16,7 @@ use nestrad_engine::traced::{FailureKind, SolveError};
 use nestrad_results::OutputError;
 use nestrad_results::trade::TradeError;
 use nestrad_service::client::{RefusalKind, RemoteError};
+use nestrad_service::server::ServeError;
 use rayon::ThreadPoolBuildError;
 use thiserror::Error;
 
@@ -69,7 +70,7 @@ impl fmt::Display for Reached {
 
 /// A master did not answer as it should.
 #[derive(Debug, Error)]
-#[error("{master}: {}", .status.message())]
+#[error("{master}: {}", nestrad_proto::reason::of(.status))]
 pub(crate) struct Unanswered {
     /// Its address.
     pub(crate) master: String,
@@ -91,8 +92,7 @@ pub(crate) fn code_of(command: impl FnOnce() -> Result<()>) -> ExitCode {
 
 fn reported(error: &anyhow::Error) -> ExitCode {
     if let Some(usage) = error.downcast_ref::<clap::Error>() {
-        // nothing can be done about a stderr that is gone
-        let _ = usage.print();
+        nestrad_proto::usage::say(usage);
         let code = u8::try_from(usage.exit_code());
         return code.unwrap_or(Exit::Usage as u8).into();
     }
@@ -137,6 +137,9 @@ fn of_one(error: &(dyn Error + 'static)) -> Option<Exit> {
     if let Some(OutputError::Mismatch { .. }) = error.downcast_ref() {
         return Some(Exit::Fault);
     }
+    if let Some(ServeError::Fault(_)) = error.downcast_ref() {
+        return Some(Exit::Fault);
+    }
     if error.is::<MissedTarget>() {
         return Some(Exit::Missed);
     }
@@ -164,7 +167,7 @@ fn of_remote(error: &RemoteError) -> Exit {
     match error {
         RemoteError::Refused { kind, .. } => of_refusal(*kind),
         RemoteError::Busy { .. } => Exit::Limit,
-        RemoteError::Lost { .. } => Exit::Master,
+        RemoteError::Lost { .. } | RemoteError::Credentials { .. } => Exit::Master,
         RemoteError::Failed { kind, .. } => of_kind(*kind),
         RemoteError::Cancelled => Exit::Cancelled,
         RemoteError::Answer(_) => Exit::Fault,

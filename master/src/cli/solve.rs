@@ -11,6 +11,7 @@ use nestrad_common::inputs::Inputs;
 use nestrad_common::inspection::Inspection;
 use nestrad_common::options::{Diameter, Options, TableFormat};
 use nestrad_common::scene::Scene;
+use nestrad_common::threads::Threads;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::plan::{Estimator, Plan, Settings};
 use nestrad_engine::progress::Progress;
@@ -25,7 +26,7 @@ use rayon::ThreadPoolBuilder;
 use serde::Deserialize;
 
 use super::bar::Bar;
-use super::console::{self, Notes};
+use super::console::Notes;
 use super::exit::MissedTarget;
 use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
@@ -98,7 +99,7 @@ struct HowFlags {
     #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
     memory: Option<f64>,
 
-    /// Number of threads, 0 for one per processor; results do not depend on it [default: 0]
+    /// Number of threads, 0 for one per processor, at most 4 for each; results do not depend on it [default: 0]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=4096), allow_negative_numbers = true)]
     threads: Option<usize>,
 
@@ -176,8 +177,11 @@ impl SolveArgs {
             out: self.results.out,
             place: self.place,
         };
-        let threads = task.inputs.options.threads.unwrap_or(0);
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        let threads = Threads::asked(task.inputs.options.threads.unwrap_or(0));
+        if let Some(warning) = &threads.warning {
+            task.notes.say("warning", warning);
+        }
+        let pool = ThreadPoolBuilder::new().num_threads(threads.count).build();
         pool.context("cannot start threads")?
             .install(|| task.solve())
     }
@@ -222,7 +226,8 @@ impl Task {
             stop: &Stop::default(),
             progress: &progress,
         };
-        let kept = self.state.open()?;
+        let told = |warning: &str| self.notes.say("warning", warning);
+        let kept = self.state.open(told)?;
         let crew = self.workers.crew(self.settings.memory_GiB, self.notes)?;
         let workers = crew.as_ref().map(Crew::cluster);
         let begins = |plan: &Plan, before: &[Round]| {
@@ -328,7 +333,7 @@ impl Task {
             }
             let mut table = Vec::new();
             terminal::write(&mut table, canopy, solution, usage)?;
-            console::print(&table)?;
+            self.notes.show(&table);
             let place = self.out.display();
             self.notes.say("done", &format!("results are in {place}"));
         }

@@ -12,6 +12,7 @@ use tokio::time::timeout;
 
 use super::console;
 use super::exit::Unanswered;
+use nestrad_common::printable::line as printable;
 
 /// A master answers within this.
 const ANSWER: Duration = Duration::from_secs(15);
@@ -59,7 +60,11 @@ fn text(status: &v1::StatusResponse) -> String {
     };
     line(
         "master",
-        format!("version {}, up {}", status.version, time(status.uptime_s)),
+        format!(
+            "version {}, up {}",
+            printable(&status.version),
+            time(status.uptime_s)
+        ),
     );
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     line(
@@ -158,11 +163,6 @@ fn solve(solve: &v1::SolveInfo) -> String {
         v1::SolveState::Unspecified => "in a state that this version does not know".to_owned(),
     };
     format!("{} ({size}) {state}", printable(&solve.solve_id))
-}
-
-/// What a master or worker calls itself must not steer a terminal.
-fn printable(text: &str) -> String {
-    text.chars().flat_map(char::escape_debug).collect()
 }
 
 fn time(seconds: f64) -> String {

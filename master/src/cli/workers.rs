@@ -9,6 +9,7 @@ use clap::Args;
 use nestrad_cluster::door::Door;
 use nestrad_cluster::local::{LocalWorkers, Share};
 use nestrad_cluster::{Cluster, WorkerLimits};
+use nestrad_common::threads::{self, FOR_EACH_PROCESSOR, Threads};
 use nestrad_engine::causes::causes;
 use nestrad_engine::plan::Plan;
 use nestrad_proto::access::Access;
@@ -120,7 +121,7 @@ impl WorkersFlags {
         }
         let local = self.workers.map(|workers| Local {
             wanted: Share {
-                workers,
+                workers: at_most(workers, notes),
                 threads: threads as u32,
                 memory_GiB,
             },
@@ -128,6 +129,20 @@ impl WorkersFlags {
         });
         Ok(Some(Crew { door, local, notes }))
     }
+}
+
+/// As many workers as there may be for the processors of this machine; says so where more were asked for.
+fn at_most(workers: u32, notes: Notes) -> u32 {
+    let most = Threads::asked(workers as usize);
+    if most.warning.is_some() {
+        let processors = threads::processors();
+        let line = format!(
+            "{workers} workers are more than {FOR_EACH_PROCESSOR} for each of {processors} processors: {} are started",
+            most.count
+        );
+        notes.say("warning", &line);
+    }
+    most.count as u32
 }
 
 /// A lease time, or patience.

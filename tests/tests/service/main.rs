@@ -8,9 +8,12 @@
 
 mod access;
 mod clients;
+mod connections;
+mod endless;
 mod garbage;
 mod light;
 mod limits;
+mod logs;
 mod many_solves;
 mod missed;
 mod neighbours;

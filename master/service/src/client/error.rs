@@ -27,6 +27,12 @@ pub enum RemoteError {
         /// For how long it was asked.
         waited_s: u64,
     },
+    /// The master, or this client, is not who the other expects.
+    #[error("{message}")]
+    Credentials {
+        /// Whose certificate is refused, and why.
+        message: String,
+    },
     /// The master is not there.
     #[error("the master cannot be reached: {message}")]
     Lost {

@@ -19,7 +19,7 @@ use nestrad_engine::progress::StageProgress;
 use nestrad_engine::traced::FailureKind;
 use nestrad_proto::channel::Authorized;
 use nestrad_proto::v1::solve_service_client::SolveServiceClient;
-use nestrad_proto::{MAX_MESSAGE_BYTES, RETRY_AFTER, v1};
+use nestrad_proto::{MAX_MESSAGE_BYTES, RETRY_AFTER, reason, v1};
 use tokio::time::{sleep, timeout};
 use tonic::{Code, Status};
 
@@ -48,6 +48,12 @@ const ANSWER: Duration = Duration::from_secs(60);
 /// A master that took the scene, or was about to give the results, so often and then failed will fail
 /// the next time.
 const MOST_ROUNDS: u32 = 8;
+
+/// A stream of progress that ends sooner than this, and tells nothing new, is no good.
+const SHORT: Duration = Duration::from_secs(10);
+
+/// So many of them after one another, and so will be the next.
+const MOST_SHORT: u32 = 10;
 
 /// A master.
 pub type Client = SolveServiceClient<Authorized>;
@@ -88,6 +94,8 @@ pub async fn solve(
         heard: None,
         busy: None,
         rounds: 0,
+        told: None,
+        short: 0,
     };
     tokio::select! {
         outcome = session.solve(&mut tell) => outcome,
@@ -142,6 +150,10 @@ struct Session {
     busy: Option<Instant>,
     /// How often it took the scene, or was about to give the results.
     rounds: u32,
+    /// What was last told of the solve.
+    told: Option<v1::SolveProgress>,
+    /// How many streams of progress ended soon, without telling anything new, since one did.
+    short: u32,
 }
 
 /// Why a try came to nothing.
@@ -193,12 +205,12 @@ impl Session {
                 }
                 Err(Setback::Away(status)) => status,
             };
-            let message = status.message().to_owned();
+            let message = reason::of(&status);
             let (since, patience) = match self.heard {
                 Some(heard) => (heard, PATIENCE),
                 None => (begun, FIRST_PATIENCE),
             };
-            if since.elapsed() > patience || self.rounds > MOST_ROUNDS {
+            if since.elapsed() > patience || self.rounds > MOST_ROUNDS || self.short > MOST_SHORT {
                 return Err(RemoteError::Lost { message });
             }
             if !told {
@@ -310,14 +322,31 @@ impl Session {
         };
         let answer = timeout(ANSWER, self.master.watch_solve(request)).await;
         let mut progress = self.answered(doing, answer)?.into_inner();
+        let (begun, mut news) = (Instant::now(), false);
         loop {
-            let message = match progress.message().await {
+            let message = progress.message().await;
+            if !matches!(message, Ok(Some(_))) {
+                let is_short = !news && begun.elapsed() < SHORT;
+                self.short = if is_short { self.short + 1 } else { 0 };
+            }
+            let message = match message {
                 Ok(Some(message)) => message,
-                Ok(None) => return Err(Setback::Away(Status::unavailable("the stream ended"))),
+                Ok(None) => {
+                    return Err(Setback::Away(Status::unavailable(
+                        "the stream of progress ended before the solve",
+                    )));
+                }
                 Err(status) => return Err(self.setback(doing, status)),
             };
             self.heard = Some(Instant::now());
             let (state, failure) = (message.state(), message.failure());
+            let told = v1::SolveProgress {
+                // told at the beginning of every stream
+                plan: Vec::new(),
+                ..message.clone()
+            };
+            news |= self.told.as_ref() != Some(&told);
+            self.told = Some(told);
             for line in message.plan {
                 tell(Event::Plan(line));
             }
@@ -354,12 +383,11 @@ impl Session {
             };
             let answer = timeout(ANSWER, self.master.fetch_results(request)).await;
             let mut slices = self.answered(doing, answer)?.into_inner();
-            while let Some(slice) = slices
-                .message()
-                .await
-                .map_err(|status| self.setback(doing, status))?
-            {
-                self.heard = Some(Instant::now());
+            loop {
+                let answer = timeout(ANSWER, slices.message()).await;
+                let Some(slice) = self.answered(doing, answer)? else {
+                    break;
+                };
                 arriving.take(slice)?;
             }
         }
@@ -390,6 +418,9 @@ impl Session {
     }
 
     fn setback(&mut self, doing: &'static str, status: Status) -> Setback {
+        if let Some(message) = reason::of_credentials(&status) {
+            return Setback::Final(RemoteError::Credentials { message });
+        }
         match status.code() {
             // what the transport says of a connection that broke
             Code::Unavailable | Code::Unknown | Code::Cancelled | Code::Internal => {

@@ -1,10 +1,10 @@
 //! The threads that solve: never those of tokio.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use nestrad_cluster::store::Store;
 use nestrad_cluster::{Cluster, with_rows};
+use nestrad_common::panics;
 use nestrad_engine::causes::causes;
 use nestrad_engine::heap::Freed;
 use nestrad_engine::plan::Plan;
@@ -19,7 +19,7 @@ use super::metrics::Metrics;
 use super::scenes::HeldScene;
 use super::solution::HeldSolution;
 use super::solve::{Phase, Solve};
-use super::solves::Solves;
+use super::solves::{Solver, Solves};
 
 /// What a master computes with.
 pub(super) struct Means<'a> {
@@ -29,19 +29,20 @@ pub(super) struct Means<'a> {
     pub(super) kept: Option<&'a Store>,
 }
 
-/// Solves what is in the queue, one solve after the other, until the master stops.
-pub(super) fn work(solves: &Solves, means: &Means, metrics: &Metrics) {
+/// Solves what is in the queue, one solve after the other, until the master stops. Whatever happens in between, a
+/// solve that was begun ends.
+pub(super) fn work(solves: &Solves, means: &Means, metrics: &Metrics, may_die: impl Fn()) {
+    let solver = Solver::of(solves, metrics);
     let mut freed = Freed::default();
-    while let Some(solve) = solves.next() {
+    while let Some(solve) = solver.next() {
         let span = tracing::info_span!("solve", id = %solve.id);
         let _entered = span.enter();
+        may_die();
         tracing::info!(triangles = solve.triangles, bands = solve.bands, "begins");
         // a fault of the program ends the solve, not the master
-        let ended = catch_unwind(AssertUnwindSafe(|| {
-            means.pool.install(|| end_of(&solve, means, metrics))
-        }));
-        let phase = ended
-            .unwrap_or_else(|_| Phase::Failed(FailureKind::Fault, "internal fault".to_owned()));
+        let ended = panics::caught(|| means.pool.install(|| end_of(&solve, means, metrics)));
+        let fault = |panic| Phase::Failed(FailureKind::Fault, format!("internal fault: {panic}"));
+        let phase = ended.unwrap_or_else(fault);
         match &phase {
             Phase::Finished(solution) => {
                 let summary = &solution.summary;
@@ -54,8 +55,7 @@ pub(super) fn work(solves: &Solves, means: &Means, metrics: &Metrics) {
             Phase::Failed(_, reason) => tracing::warn!(reason, "failed"),
             _ => tracing::info!("cancelled"),
         }
-        metrics.ended(&phase);
-        solves.ended(&solve, phase);
+        solve.ends(phase);
         freed.give_back();
     }
 }

@@ -2,6 +2,8 @@
 //! others. Of bounded number and size. What came of a solve is kept until its client has it, or until the time for
 //! that is over; only what is not awaited any more makes room for others.
 
+mod solver;
+
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, SystemTime};
 
@@ -12,6 +14,8 @@ use super::identity::{Id, solve_id};
 use super::scenes::HeldScene;
 use super::solve::{Phase, Solve, lock};
 use nestrad_engine::plan::Settings;
+
+pub(super) use solver::Solver;
 
 /// Solves that have ended, are not awaited, and are kept, however small their results.
 const MAX_ENDED: usize = 256;
@@ -39,6 +43,8 @@ struct Known {
     /// What one takes, seconds, about: of the last ones.
     mean_s: f64,
     stopping: bool,
+    /// Threads that compute.
+    solvers: usize,
 }
 
 impl Solves {
@@ -76,7 +82,7 @@ impl Solves {
     }
 
     /// The next solve to compute; waits for it. None when the master stops.
-    pub(super) fn next(&self) -> Option<Arc<Solve>> {
+    fn next(&self) -> Option<Arc<Solve>> {
         let mut known = self.lock();
         loop {
             if let Some(number) = admission::next(&known.solves) {
@@ -95,7 +101,7 @@ impl Solves {
     }
 
     /// What came of a solve that was computed.
-    pub(super) fn ended(&self, solve: &Solve, state: Phase) {
+    fn ended(&self, solve: &Solve, state: Phase) {
         let mut known = self.lock();
         solve.end(state);
         if let Some(begun) = solve.begun() {
