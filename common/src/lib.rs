@@ -9,6 +9,7 @@
 )]
 
 pub mod assemble;
+pub mod bounded;
 pub mod canopy;
 pub mod figures;
 pub mod formats;
@@ -19,4 +20,7 @@ pub mod inspection;
 pub mod light;
 pub mod optics;
 pub mod options;
+pub mod panics;
+pub mod printable;
 pub mod scene;
+pub mod threads;

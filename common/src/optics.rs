@@ -81,6 +81,14 @@ impl LeafOptics {
     }
 }
 
+/// An albedo that is taken, for messages.
+pub const AN_ALBEDO: &str = "an albedo from 0 to 1";
+
+/// Whether an albedo of the soil is physical: as strict as the reflectance of an opaque material.
+pub fn is_albedo(value: f64) -> bool {
+    LeafOptics::opaque(value).check().is_ok()
+}
+
 /// The optical properties of a canopy in every band.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Optics {

@@ -7,6 +7,11 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
+use crate::threads::MOST_THREADS;
+
+/// Memory that a solve may take where nothing is said, GiB.
+pub const DEFAULT_MEMORY_GIB: f64 = 8.0;
+
 /// The options of a solve, each of them optional: the defaults are the plan's.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -44,24 +49,37 @@ impl Options {
         }
     }
 
-    /// Refuses an accuracy or a memory that is not above zero.
+    /// Refuses an accuracy or a memory that is not above zero, and more threads than any machine has.
     pub fn check(&self) -> Result<(), OptionFault> {
         for (name, value) in [
             ("accuracy", self.accuracy_percent),
             ("memory", self.memory_GiB),
         ] {
-            if let Some(value) = value
-                && !(value.is_finite() && value > 0.0)
-            {
-                return Err(OptionFault {
-                    option: name,
-                    expected: "a number above 0",
-                    found: value.to_string(),
-                });
-            }
+            value.map_or(Ok(0.0), |value| above_zero(name, value))?;
+        }
+        if let Some(threads) = self.threads
+            && threads > MOST_THREADS
+        {
+            return Err(OptionFault {
+                option: "threads",
+                expected: "a whole number from 0 to 4096",
+                found: threads.to_string(),
+            });
         }
         Ok(())
     }
+}
+
+/// Refuses what is not a finite number above zero: every option that is a measure.
+pub fn above_zero(option: &'static str, value: f64) -> Result<f64, OptionFault> {
+    if value.is_finite() && value > 0.0 {
+        return Ok(value);
+    }
+    Err(OptionFault {
+        option,
+        expected: "a number above 0",
+        found: value.to_string(),
+    })
 }
 
 /// An option that cannot be.
@@ -181,10 +199,12 @@ pub enum Diameter {
     Metres(f64),
 }
 
-const DIAMETERS: &str = "auto, inf or a number of metres above 0";
+/// A diameter that is taken, for messages.
+pub const DIAMETERS: &str = "auto, inf or a number of metres above 0";
 
 impl Diameter {
-    fn metres(value: f64) -> Option<Self> {
+    /// From a number: a length above zero, or infinity for no bound.
+    pub fn metres(value: f64) -> Option<Self> {
         if value == f64::INFINITY {
             return Some(Self::Infinite);
         }

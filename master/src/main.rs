@@ -14,7 +14,12 @@ use clap::Parser;
 use cli::{Cli, Command};
 
 fn main() -> ExitCode {
-    let outcome = match Cli::parse().command {
+    nestrad_engine::heap::settle();
+    let command = match Cli::try_parse() {
+        Ok(cli) => cli.command,
+        Err(usage) => return cli::code_of(|| Err(usage.into())),
+    };
+    cli::code_of(|| match command {
         Command::Solve(args) => args.run(),
         Command::Check(args) => args.run(),
         Command::Generate(args) => args.run(),
@@ -22,6 +27,5 @@ fn main() -> ExitCode {
         Command::Serve(args) => args.run(),
         Command::Status(args) => args.run(),
         Command::Trade(args) => args.run(),
-    };
-    cli::exit_code(outcome)
+    })
 }

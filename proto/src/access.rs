@@ -12,6 +12,7 @@ use tower::layer::util::{Identity as NoLayer, Stack};
 
 use crate::authority::{Authority, AuthorityError};
 use crate::channel::{CONNECTION_WINDOW, KEEP_ALIVE, PemError, STREAM_WINDOW, pem};
+use crate::connections::Connections;
 use crate::guard::{Credential, Guard};
 use crate::token::{Token, TokenError};
 
@@ -62,9 +63,13 @@ pub struct Access {
 pub type GuardedServer = Server<Stack<Guard, NoLayer>>;
 
 impl Access {
-    /// A server for `address` to which services can be added. Refused where other machines could read
-    /// along or come in without credentials.
-    pub fn server(&self, address: SocketAddr) -> Result<GuardedServer, AccessError> {
+    /// A server for `address` to which services can be added, and that serves these connections. Refused where other
+    /// machines could read along or come in without credentials, and where clients cannot be told from workers.
+    pub fn server(
+        &self,
+        address: SocketAddr,
+        connections: &Connections,
+    ) -> Result<GuardedServer, AccessError> {
         let credential = |token: &Option<PathBuf>, authority: &Option<PathBuf>| {
             Ok::<_, AccessError>(Credential {
                 token: token.as_deref().map(Token::read).transpose()?,
@@ -74,7 +79,9 @@ impl Access {
         let guard = Guard {
             client: credential(&self.client_token, &self.client_ca)?,
             worker: credential(&self.worker_token, &self.worker_ca)?,
+            connections: connections.clone(),
         };
+        self.check_apart(&guard.client, &guard.worker)?;
         if !address.ip().is_loopback() {
             if self.tls_cert.is_none() && !self.allow_plaintext {
                 return Err(AccessError::Plaintext { address });
@@ -110,6 +117,31 @@ impl Access {
         }
         Ok(server.layer(guard))
     }
+
+    /// What clients show is not what workers show.
+    fn check_apart(&self, client: &Credential, worker: &Credential) -> Result<(), AccessError> {
+        let name = |path: &Option<PathBuf>| path.clone().unwrap_or_default();
+        let tokens = (&client.token, &worker.token);
+        let by_token = matches!(tokens, (Some(_), Some(_)));
+        if let (Some(client), Some(worker)) = tokens
+            && client.is_same_as(worker)
+        {
+            return Err(AccessError::OneToken {
+                client: name(&self.client_token),
+                worker: name(&self.worker_token),
+            });
+        }
+        if let (Some(client), Some(worker)) = (&client.authority, &worker.authority)
+            && !by_token
+            && client.shares_with(worker)
+        {
+            return Err(AccessError::OneAuthority {
+                client: name(&self.client_ca),
+                worker: name(&self.worker_ca),
+            });
+        }
+        Ok(())
+    }
 }
 
 /// Why a master does not open its door.
@@ -130,6 +162,29 @@ pub enum AccessError {
     Open {
         /// Where it was to listen.
         address: SocketAddr,
+    },
+    /// A client would be a worker, and a worker a client.
+    #[error(
+        "{} and {}: expected two tokens, found the same one: with it, workers could solve and clients could compute",
+        client.display(), worker.display()
+    )]
+    OneToken {
+        /// File with the token of clients.
+        client: PathBuf,
+        /// File with the token of workers.
+        worker: PathBuf,
+    },
+    /// A client would be a worker, and a worker a client.
+    #[error(
+        "{} and {}: expected two authorities, found a certificate that is in both: with it, workers could solve and \
+         clients could compute",
+        client.display(), worker.display()
+    )]
+    OneAuthority {
+        /// The authority of clients.
+        client: PathBuf,
+        /// The authority of workers.
+        worker: PathBuf,
     },
     /// A certificate or key cannot be used.
     #[error(transparent)]
@@ -157,8 +212,9 @@ mod tests {
         let loopback: SocketAddr = "127.0.0.1:0".parse().unwrap();
         let any: SocketAddr = "0.0.0.0:7410".parse().unwrap();
         let closed = Access::default();
-        assert!(closed.server(loopback).is_ok());
-        let refusal = |access: &Access| access.server(any).err().unwrap().to_string();
+        let server = |access: &Access, at| access.server(at, &Connections::default());
+        assert!(server(&closed, loopback).is_ok());
+        let refusal = |access: &Access| server(access, any).err().unwrap().to_string();
         assert!(refusal(&closed).contains("--allow-plaintext"));
         let plain = Access {
             allow_plaintext: true,
@@ -169,11 +225,61 @@ mod tests {
             client_token: Some(token),
             ..plain
         };
-        assert!(known.server(any).is_ok());
+        assert!(server(&known, any).is_ok());
         let hidden = Access {
             allow_plaintext: false,
             ..known
         };
         assert!(refusal(&hidden).contains("0.0.0.0:7410"));
+    }
+
+    #[test]
+    fn clients_and_workers_do_not_show_the_same() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            Some(path)
+        };
+        let authority = || {
+            let mut params = rcgen::CertificateParams::default();
+            params.is_ca = rcgen::IsCa::Ca(rcgen::BasicConstraints::Unconstrained);
+            let key = rcgen::KeyPair::generate().unwrap();
+            params.self_signed(&key).unwrap().pem()
+        };
+        let (one, other) = (authority(), authority());
+        let two = format!("{other}{one}");
+        let here: SocketAddr = "127.0.0.1:0".parse().unwrap();
+        let refusal = |access: Access| {
+            let server = access.server(here, &Connections::default());
+            server
+                .err()
+                .map(|error| error.to_string())
+                .unwrap_or_default()
+        };
+        let tokens = |worker: &str| Access {
+            client_token: file("client", "0123456789abcdef"),
+            worker_token: file("worker", worker),
+            ..Access::default()
+        };
+        assert!(refusal(tokens(" 0123456789abcdef\n")).contains("worker: expected two tokens"));
+        assert_eq!(refusal(tokens("0123456789abcdeg")), "");
+        let authorities = |worker: &str| Access {
+            client_ca: file("client.pem", &one),
+            worker_ca: file("worker.pem", worker),
+            ..Access::default()
+        };
+        assert!(refusal(authorities(&two)).contains("expected two authorities"));
+        assert_eq!(refusal(authorities(&other)), "");
+        // a token for each tells them apart, one for clients alone does not
+        let mut both = Access {
+            worker_token: None,
+            ..tokens("")
+        };
+        both.client_ca = authorities(&one).client_ca;
+        both.worker_ca = authorities(&one).worker_ca;
+        assert!(refusal(both.clone()).contains("expected two authorities"));
+        both.worker_token = tokens("0123456789abcdeg").worker_token;
+        assert_eq!(refusal(both), "");
     }
 }

@@ -16,7 +16,10 @@ use crate::channel::{PemError, pem};
 
 /// One or more certificates that others are signed with.
 #[derive(Clone)]
-pub struct Authority(Arc<dyn ClientCertVerifier>);
+pub struct Authority {
+    verifier: Arc<dyn ClientCertVerifier>,
+    certificates: Vec<CertificateDer<'static>>,
+}
 
 impl Authority {
     /// Reads the certificates of an authority, PEM.
@@ -27,14 +30,19 @@ impl Authority {
         };
         let bytes = pem(path)?;
         let mut roots = RootCertStore::empty();
+        let mut certificates = Vec::new();
         for certificate in CertificateDer::pem_slice_iter(&bytes) {
             let certificate = certificate.map_err(|e| fault(e.to_string()))?;
+            certificates.push(certificate.clone());
             roots.add(certificate).map_err(|e| fault(e.to_string()))?;
         }
         let provider = Arc::new(ring::default_provider());
         WebPkiClientVerifier::builder_with_provider(Arc::new(roots), provider)
             .build()
-            .map(Self)
+            .map(|verifier| Self {
+                verifier,
+                certificates,
+            })
             .map_err(|e| fault(e.to_string()))
     }
 
@@ -44,8 +52,16 @@ impl Authority {
         let Some((own, between)) = chain.split_first() else {
             return false;
         };
-        let verified = self.0.verify_client_cert(own, between, UnixTime::now());
+        let verified = self
+            .verifier
+            .verify_client_cert(own, between, UnixTime::now());
         verified.is_ok()
+    }
+
+    /// Whether a certificate is of both authorities.
+    pub(crate) fn shares_with(&self, other: &Self) -> bool {
+        let mut own = self.certificates.iter();
+        own.any(|certificate| other.certificates.contains(certificate))
     }
 }
 

@@ -5,6 +5,7 @@ use std::time::Duration;
 
 use clap::Args;
 use http::Uri;
+use nestrad_common::bounded::with_line_feeds;
 use thiserror::Error;
 use tonic::metadata::{Ascii, MetadataValue};
 use tonic::service::Interceptor;
@@ -127,6 +128,7 @@ pub(crate) fn pem(path: &Path) -> Result<Vec<u8>, PemError> {
         message,
     };
     let bytes = read_small(path).map_err(|error| fault(format!("cannot be read: {error}")))?;
+    let bytes = with_line_feeds(&bytes).into_owned();
     let begins = b"-----BEGIN ";
     if !bytes.windows(begins.len()).any(|window| window == begins) {
         return Err(fault("expected PEM, found no BEGIN line".to_owned()));

@@ -3,6 +3,7 @@
 //! Anybody may ask for the master's health. What a client shows opens the client service, what a worker
 //! shows the worker service, either one the reflection service.
 
+use std::net::SocketAddr;
 use std::pin::Pin;
 use std::sync::Arc;
 use std::task::{Context, Poll};
@@ -15,6 +16,7 @@ use tonic::transport::server::{TcpConnectInfo, TlsConnectInfo};
 use tower::{Layer, Service};
 
 use crate::authority::Authority;
+use crate::connections::Connections;
 use crate::token::Token;
 use crate::v1::{solve_service_server, worker_service_server};
 
@@ -27,6 +29,8 @@ pub struct Guard {
     pub client: Credential,
     /// Opens the worker service.
     pub worker: Credential,
+    /// Where it is known who has been let in.
+    pub connections: Connections,
 }
 
 /// What opens a service: all of it must be shown. Without anything, nobody is let in.
@@ -73,7 +77,7 @@ impl Credential {
 impl Guard {
     /// Whether the caller of `path` is let in.
     fn check(&self, path: &str, shown: Shown) -> Result<(), Status> {
-        let service = path.split('/').nth(1).unwrap_or_default();
+        let service = service(path);
         if service == HEALTH || (self.client.is_empty() && self.worker.is_empty()) {
             return Ok(());
         }
@@ -94,6 +98,22 @@ impl Guard {
             Err(Status::unauthenticated(text))
         }
     }
+}
+
+impl Guard {
+    /// The caller at an address keeps its connection; who only asks for health gives way where there is no room.
+    fn let_in(&self, path: &str, from: Option<SocketAddr>) {
+        match from {
+            Some(address) if service(path) == HEALTH => self.connections.has_asked(address),
+            Some(address) => self.connections.is_let_in(address),
+            None => {}
+        }
+    }
+}
+
+/// The service that a path is of.
+fn service(path: &str) -> &str {
+    path.split('/').nth(1).unwrap_or_default()
 }
 
 impl<S> Layer<S> for Guard {
@@ -131,16 +151,21 @@ where
 
     fn call(&mut self, request: Request<Sent>) -> Self::Future {
         let header = request.headers().get(AUTHORIZATION);
-        let chain = request
-            .extensions()
-            .get::<TlsConnectInfo<TcpConnectInfo>>()
-            .and_then(|info| info.peer_certs());
+        let secure = request.extensions().get::<TlsConnectInfo<TcpConnectInfo>>();
+        let chain = secure.and_then(|info| info.peer_certs());
+        let plain = request.extensions().get::<TcpConnectInfo>();
+        let from = secure.map(|info| info.get_ref()).or(plain);
+        let from = from.and_then(|info| info.remote_addr());
         let shown = Shown {
             header: header.map(|h| h.as_bytes()),
             chain: chain.as_ref().map_or(&[], |chain| &chain[..]),
         };
-        match self.guard.check(request.uri().path(), shown) {
-            Ok(()) => Box::pin(self.inner.call(request)),
+        let path = request.uri().path();
+        match self.guard.check(path, shown) {
+            Ok(()) => {
+                self.guard.let_in(path, from);
+                Box::pin(self.inner.call(request))
+            }
             Err(status) => Box::pin(std::future::ready(Ok(status.into_http()))),
         }
     }
@@ -165,6 +190,7 @@ mod tests {
         Guard {
             client: credential("client-client-client"),
             worker: credential("worker-worker-worker"),
+            connections: Connections::default(),
         }
     }
 
@@ -252,6 +278,7 @@ mod tests {
         let guard = Guard {
             client: by(clients),
             worker: by(workers),
+            connections: Connections::default(),
         };
         let code = |path, chain: &[CertificateDer<'static>]| {
             let shown = Shown {

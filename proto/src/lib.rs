@@ -1,5 +1,6 @@
 //! The messages that master, workers and clients exchange, generated from `nestrad/v1/*.proto`, which
-//! documents them field by field, and the channels that they travel on.
+//! documents them field by field, and the channels that they travel on. And what master and worker have in common as
+//! processes: the [`log`], and what is said of their [`usage`].
 //!
 //! This crate may import the kernel and `nestrad-common`; [`near_field`] turns their types into messages and back.
 
@@ -8,10 +9,14 @@
 pub mod access;
 pub mod authority;
 pub mod channel;
+pub mod connections;
 pub mod guard;
+pub mod log;
 mod mesh;
 pub mod near_field;
+pub mod reason;
 pub mod token;
+pub mod usage;
 
 /// Version 1 of the protocol.
 pub mod v1 {
@@ -32,3 +37,6 @@ pub const MAX_MESSAGE_BYTES: usize = 8 << 20;
 
 /// The largest slice of something that travels in slices, bytes, about.
 pub const SLICE_BYTES: usize = 512 << 10;
+
+/// The metadata of an error that goes away: after so many seconds the same call may succeed.
+pub const RETRY_AFTER: &str = "retry-after";

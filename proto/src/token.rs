@@ -1,10 +1,10 @@
 //! Bearer tokens: secrets that are compared in constant time and never shown.
 
 use std::fmt;
-use std::fs::File;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 
+use nestrad_common::bounded::{self, Limit};
 use subtle::ConstantTimeEq;
 use thiserror::Error;
 use tonic::metadata::{Ascii, MetadataValue};
@@ -16,7 +16,7 @@ pub const TOKEN_VARIABLE: &str = "NESTRAD_TOKEN";
 const LENGTHS: std::ops::RangeInclusive<usize> = 16..=4096;
 
 /// Certificates, keys and tokens are no larger than this.
-const MAX_FILE_BYTES: u64 = 1 << 20;
+const LIMIT: Limit = Limit::fixed(1 << 20);
 
 /// A secret that says who may use which service.
 #[derive(Clone)]
@@ -64,6 +64,11 @@ impl Token {
         given.is_some_and(|given| bool::from(given.ct_eq(self.0.as_bytes())))
     }
 
+    /// Whether it is the same as another.
+    pub(crate) fn is_same_as(&self, other: &Self) -> bool {
+        bool::from(self.0.as_bytes().ct_eq(other.0.as_bytes()))
+    }
+
     /// The value of the header `authorization`, which is kept out of logs.
     pub(crate) fn header(&self) -> Result<MetadataValue<Ascii>, TokenFault> {
         let mut value: MetadataValue<Ascii> = format!("Bearer {}", self.0)
@@ -82,15 +87,7 @@ impl fmt::Debug for Token {
 
 /// The content of a file that holds a certificate, a key or a token.
 pub(crate) fn read_small(path: &Path) -> io::Result<Vec<u8>> {
-    let mut bytes = Vec::new();
-    File::open(path)?
-        .take(MAX_FILE_BYTES + 1)
-        .read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > MAX_FILE_BYTES {
-        let message = format!("the file is larger than {MAX_FILE_BYTES} bytes");
-        return Err(io::Error::new(io::ErrorKind::FileTooLarge, message));
-    }
-    Ok(bytes)
+    bounded::read(path, LIMIT)
 }
 
 /// Not a token. What was found is not said.

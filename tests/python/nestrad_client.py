@@ -4,6 +4,7 @@ Lengths in metres, irradiances in W m-2, powers in W; z points up. Stubs are mad
 by `set_up`; they document every field.
 """
 
+import time
 from dataclasses import dataclass, field
 
 import grpc
@@ -94,23 +95,26 @@ class Master:
 
     def upload(self, geometry, bands, sources):
         """Uploads a scene. The answer has scene_id, geometry_id, facts and warnings."""
-        return self._upload(_slices(geometry, bands, sources))
+        return self._upload(lambda: _slices(geometry, bands, sources))
 
     def relight(self, geometry_id, bands, sources):
         """Uploads other light and optics for a geometry that the master holds."""
         header = _header(bands, sources)
         header.geometry_id = geometry_id
-        return self._upload([scene_pb.SceneSlice(header=header)])
+        return self._upload(lambda: iter([scene_pb.SceneSlice(header=header)]))
 
     def _upload(self, slices):
-        return self._stub.UploadScene(iter(slices), metadata=self._metadata)
+        return _patiently(lambda: self._stub.UploadScene(slices(), metadata=self._metadata))
 
     def solve(self, scene_id, progress=None, **options):
         """Starts a solve and waits for its end; `options` are the fields of SolveOptions. `progress` is called
         with every message of the master. Ctrl-C, or any other exception, cancels the solve at the master.
         Returns the name of the solve."""
         request = pb.StartSolveRequest(scene_id=scene_id, options=pb.SolveOptions(**options))
-        solve_id = self._stub.StartSolve(request, timeout=60, metadata=self._metadata).solve_id
+        started = _patiently(
+            lambda: self._stub.StartSolve(request, timeout=60, metadata=self._metadata)
+        )
+        solve_id = started.solve_id
         try:
             request = pb.WatchSolveRequest(solve_id=solve_id)
             for now in self._stub.WatchSolve(request, metadata=self._metadata):
@@ -151,6 +155,19 @@ class Master:
     def _fetch(self, solve_id, table):
         request = pb.FetchResultsRequest(solve_id=solve_id, table=table)
         return self._stub.FetchResults(request, metadata=self._metadata)
+
+
+def _patiently(call):
+    """A call of a master that may have no room: tried again when it says, for 15 minutes."""
+    end = time.monotonic() + 900
+    while True:
+        try:
+            return call()
+        except grpc.RpcError as error:
+            wait = dict(error.trailing_metadata() or ()).get("retry-after")
+            if wait is None or time.monotonic() + float(wait) > end:
+                raise
+            time.sleep(float(wait))
 
 
 def _header(bands, sources):

@@ -120,6 +120,24 @@ pub async fn ended(client: &mut Client, solve_id: &str) -> v1::SolveProgress {
     last
 }
 
+/// Takes all results of a solve, as `nestrad solve --master` does.
+pub async fn fetch(client: &mut Client, solve_id: &str) -> Result<(), tonic::Status> {
+    for table in [
+        v1::ResultTable::Organs,
+        v1::ResultTable::Triangles,
+        v1::ResultTable::Soil,
+        v1::ResultTable::Summary,
+    ] {
+        let request = v1::FetchResultsRequest {
+            solve_id: solve_id.to_owned(),
+            table: table.into(),
+        };
+        let mut slices = client.fetch_results(request).await?.into_inner();
+        while slices.message().await?.is_some() {}
+    }
+    Ok(())
+}
+
 /// A whole solve.
 pub async fn solve(client: Client, scene: Scene, settings: &Settings) -> SolvedThere {
     let solved = client::solve(client, scene, settings, |_| {}, std::future::pending());

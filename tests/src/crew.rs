@@ -16,7 +16,8 @@ pub struct Process {
 }
 
 impl Process {
-    fn start(mut command: Command) -> Self {
+    /// Starts a program.
+    pub fn start(mut command: Command) -> Self {
         let mut child = command
             .stdin(Stdio::null())
             .stdout(Stdio::null())
@@ -56,6 +57,17 @@ impl Process {
             status.is_some()
         });
         status.unwrap()
+    }
+
+    /// The processes that it has started and that live.
+    pub fn children(&self) -> Vec<u32> {
+        let id = self.child.id();
+        let tasks = std::fs::read_dir(format!("/proc/{id}/task")).unwrap();
+        let of = |task: std::fs::DirEntry| std::fs::read_to_string(task.path().join("children"));
+        let listed = tasks.filter_map(|task| of(task.ok()?).ok());
+        let listed: Vec<String> = listed.collect();
+        let ids = listed.iter().flat_map(|ids| ids.split_whitespace());
+        ids.map(|id| id.parse().unwrap()).collect()
     }
 
     /// Memory of the process at its peak, bytes; `None` once it has ended.

@@ -1,7 +1,7 @@
 //! The real programs as processes, with every wait bounded.
 
 use std::io::{BufRead, BufReader, Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus, Output, Stdio};
 use std::sync::mpsc::{self, Receiver};
@@ -141,6 +141,32 @@ impl Master {
             address,
             metrics,
             log,
+        }
+    }
+
+    /// Starts a master that says everything it could say to a place that may not take it.
+    pub fn start_without_log(stderr: Stdio, args: &[&str]) -> Self {
+        let free = [(); 2].map(|()| TcpListener::bind("127.0.0.1:0").unwrap());
+        let [address, metrics] = free.each_ref().map(|port| port.local_addr().unwrap());
+        drop(free);
+        let places = [address, metrics].map(|place| place.to_string());
+        let places = ["serve", "--listen", &places[0], "--metrics", &places[1]];
+        let mut command = nestrad(Path::new("."), &[&places, args].concat());
+        command.env("NESTRAD_LOG", "trace");
+        let mut child = command
+            .stdout(Stdio::null())
+            .stderr(stderr)
+            .spawn()
+            .unwrap();
+        until("a master listens", || {
+            assert!(child.try_wait().unwrap().is_none(), "the master has ended");
+            TcpStream::connect(metrics).is_ok() && TcpStream::connect(address).is_ok()
+        });
+        Self {
+            child,
+            address,
+            metrics,
+            log: Arc::default(),
         }
     }
 

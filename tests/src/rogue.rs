@@ -1,16 +1,20 @@
 //! A worker whose every call a test decides on.
 
 use std::net::SocketAddr;
+use std::time::Duration;
 
 use nestrad_kernel::packed::Shape;
 use nestrad_proto::near_field;
 use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
 use nestrad_proto::v1::{
-    self, FetchBlockRequest, GiveBackRequest, JoinRequest, LeaseRequest, LeasedJob, RenewRequest,
-    ReturnRowsRequest, RowsHeader, fetch_block_response, lease_response, return_rows_request,
+    self, FetchBlockRequest, GiveBackRequest, JoinRequest, LeaseRequest, LeasedJob, LeaveRequest,
+    RenewRequest, ReturnRowsRequest, RowsHeader, fetch_block_response, lease_response,
+    return_rows_request,
 };
 use prost::Message;
 use tokio::runtime::{Builder, Runtime};
+use tokio::sync::mpsc;
+use tokio_stream::wrappers::ReceiverStream;
 use tonic::Status;
 use tonic::transport::{Channel, Endpoint};
 
@@ -178,6 +182,33 @@ impl Rogue {
         let stream = tokio_stream::iter(messages.collect::<Vec<_>>());
         let answer = self.call(self.client.clone().return_rows(stream))?;
         Ok(answer.into_inner().used)
+    }
+
+    /// Begins to return a result of which a byte comes every two seconds, for as long as the master bears with it.
+    pub fn drip(&self, header: RowsHeader) {
+        let (sender, messages) = mpsc::channel(1);
+        self.runtime.spawn(async move {
+            let mut part = return_rows_request::Part::Header(header);
+            while sender
+                .send(ReturnRowsRequest { part: Some(part) })
+                .await
+                .is_ok()
+            {
+                tokio::time::sleep(Duration::from_secs(2)).await;
+                part = return_rows_request::Part::Chunk(vec![1].into());
+            }
+        });
+        let mut client = self.client.clone();
+        self.runtime.spawn(async move {
+            // refused or given up: it does not matter to who wants to be in the way
+            let _ = client.return_rows(ReceiverStream::new(messages)).await;
+        });
+    }
+
+    /// Says that it goes.
+    pub fn leave(&self) {
+        let request = LeaveRequest { worker_id: self.id };
+        self.call(self.client.clone().leave(request)).unwrap();
     }
 
     /// A heartbeat; gives the leases that are not wanted.

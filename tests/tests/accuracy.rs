@@ -2,18 +2,25 @@
 
 #![allow(clippy::unwrap_used)]
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use glam::{DVec2, DVec3};
 use nestrad_common::canopy::Organ;
 use nestrad_common::generate::{LeafAngles, Maize, Stand};
 use nestrad_common::options::Diameter;
 use nestrad_common::scene::Scene;
 use nestrad_engine::account::organ_spread;
+use nestrad_engine::exchange::{
+    ExchangeError, JobCounts, RowSource, Sampling, Take, ThisProcess, Work,
+};
+use nestrad_engine::frame::Frame;
 use nestrad_engine::plan::{Aims, Estimator, Settings};
 use nestrad_engine::rounds::{Ended, Solved};
+use nestrad_engine::run::Run;
 use nestrad_tests::canopies::{par_and_nir, scenery, small_leaves, uniform_sky};
 use nestrad_tests::random::Dice;
 use nestrad_tests::scenery::{Scenery, from_zenith};
-use nestrad_tests::solving::{apart_percent, in_rounds, plan, solve, try_plan};
+use nestrad_tests::solving::{apart_percent, in_rounds, in_rounds_by, plan, solve, try_plan};
 
 fn reach(scene: &Scene, settings: &Settings) -> Solved {
     in_rounds(scene, settings).unwrap()
@@ -116,23 +123,6 @@ fn a_round_that_misses_is_followed_by_a_finer_one() {
 }
 
 #[test]
-fn without_time_a_pilot_has_to_do_and_says_what_it_reached() {
-    let settings = Settings {
-        budget_s: Some(1e-6),
-        ..asked(0.1)
-    };
-    let accuracy = reach(&maize(1).scene(), &settings).accuracy;
-    assert_eq!(accuracy.ended, Ended::OutOfTime);
-    assert_eq!(accuracy.rounds.len(), 1);
-    assert!(accuracy.rounds[0].reached_percent.unwrap() > 0.1);
-    assert!(
-        accuracy
-            .to_string()
-            .contains("--budget leaves no time for a finer round")
-    );
-}
-
-#[test]
 fn without_memory_the_best_that_fits_has_to_do() {
     let scene = maize(1).scene();
     let settings = Settings {
@@ -231,5 +221,55 @@ fn small_leaves_need_no_second_round() {
         // nor is more done than is needed
         let reached = accuracy.rounds[0].reached_percent.unwrap();
         assert!(reached > 0.5, "{reached}");
+    }
+}
+
+/// What traces the first round as it should, and fails in the second.
+struct FailsLater {
+    rounds: AtomicUsize,
+    panics: bool,
+}
+
+impl RowSource for FailsLater {
+    fn cut(&self, frame: &Frame, sampling: &Sampling, run: &Run) -> Result<Work, ExchangeError> {
+        ThisProcess::default().cut(frame, sampling, run)
+    }
+
+    fn trace(
+        &self,
+        frame: &Frame,
+        work: &Work,
+        wanted: &[usize],
+        take: &mut Take<'_>,
+        run: &Run,
+    ) -> Result<JobCounts, ExchangeError> {
+        match self.rounds.fetch_add(1, Ordering::Relaxed) {
+            0 => ThisProcess::default().trace(frame, work, wanted, take, run),
+            _ if self.panics => panic!("out of paper"),
+            _ => Err(ExchangeError::Failed("out of paper".to_owned())),
+        }
+    }
+}
+
+#[test]
+fn a_later_round_that_fails_leaves_the_round_before_and_names_the_fault() {
+    let scene = maize(2).scene();
+    // with this, a coarse look comes first
+    let settings = asked(0.3);
+    for panics in [false, true] {
+        let rows = FailsLater {
+            rounds: AtomicUsize::new(0),
+            panics,
+        };
+        let kept = in_rounds_by(&scene, &settings, &rows).unwrap();
+        assert_eq!(kept.accuracy.ended, Ended::Failed);
+        assert_eq!(kept.accuracy.rounds.len(), 1);
+        let failure = kept.accuracy.failure.as_deref();
+        assert!(failure.unwrap().ends_with("out of paper"), "{failure:?}");
+        let said = kept.accuracy.to_string();
+        assert!(
+            said.contains("missed") && said.contains("a finer round failed"),
+            "{said}"
+        );
     }
 }

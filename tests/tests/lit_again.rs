@@ -9,14 +9,15 @@ use std::time::{Duration, Instant};
 use nestrad_common::light::Sky;
 use nestrad_common::options::Diameter;
 use nestrad_common::scene::Scene;
-use nestrad_engine::direct::direct_light;
+use nestrad_engine::direct::{KeptDirections, direct_light, direct_light_keeping};
 use nestrad_engine::exchange::{
     ExchangeError, JobCounts, RowSource, Sampling, Take, ThisProcess, Work,
 };
 use nestrad_engine::frame::Frame;
 use nestrad_engine::plan::{Plan, Settings};
 use nestrad_engine::progress::Progress;
-use nestrad_engine::rounds::{self, Ended, RoundsError, solve_in_rounds};
+use nestrad_engine::resident::Resident;
+use nestrad_engine::rounds::{self, Ended, RoundsError, light_in_rounds, solve_in_rounds};
 use nestrad_engine::run::Run;
 use nestrad_engine::stop::{Stop, Stopped};
 use nestrad_engine::stopwatch::Stopwatch;
@@ -297,4 +298,93 @@ fn a_first_round_that_fails_says_why() {
     let failed = matches!(error, RoundsError::Solve(SolveError::Exchange(_)));
     assert!(failed, "{error:?}");
     assert_eq!(error.to_string(), "out of paper");
+}
+
+/// Solves by the default settings of `coarse`, with a canopy that may be resident.
+fn light(scene: &Scene, settings: &Settings, resident: &mut Resident) -> rounds::Solved {
+    let (rows, watch) = (ThisProcess::default(), &mut Stopwatch::start());
+    unwatched(|run| {
+        light_in_rounds(
+            (scene, &mut *resident),
+            settings,
+            &rows,
+            run,
+            watch,
+            |_, _| (),
+        )
+    })
+    .unwrap()
+}
+
+/// The same canopy under another light.
+fn under(scene: &Scene, other: &Scene) -> Scene {
+    Scene {
+        optics: other.optics.clone(),
+        light: other.light.clone(),
+        ..scene.clone()
+    }
+}
+
+fn every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(settings: &Settings) {
+    let day = maize();
+    let resident = &mut Resident::within(1 << 30);
+    let lights = [day.clone(), under(&day, &overcast_maize()), day.clone()];
+    let mut traced = Vec::new();
+    for scene in &lights {
+        let solved = light(scene, settings, resident);
+        traced.push(solved.work.jobs.traced);
+        assert!(solved.solution == finish(scene, &solved.plan).unwrap().solution);
+    }
+    assert!(traced[0] > 0);
+    assert_eq!(traced[1..], [0, 0]);
+}
+
+#[test]
+fn a_resident_canopy_traces_nothing_for_another_light() {
+    every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(&coarse());
+}
+
+#[test]
+fn a_resident_canopy_begins_as_finely_as_its_rounds_have_ended() {
+    let settings = Settings {
+        accuracy_percent: 3.0,
+        in_rounds: true,
+        ..Settings::default()
+    };
+    every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(&settings);
+}
+
+#[test]
+fn a_canopy_that_there_is_no_room_for_is_traced_anew_with_the_same_bits() {
+    let day = maize();
+    let [wide, narrow] = [1 << 30, 1 << 10].map(|bytes| {
+        let resident = &mut Resident::within(bytes);
+        [0, 1].map(|_| light(&day, &coarse(), resident))
+    });
+    assert!(wide[1].work.jobs.traced == 0 && narrow[1].work.jobs.traced > 0);
+    assert!(wide[1].solution == narrow[1].solution);
+}
+
+/// More directions than there is room for: some are projected again, and nothing else changes.
+#[test]
+fn directions_that_there_is_no_room_for_are_projected_again() {
+    let scene = scenery(&small_maize(), &par_and_nir(), uniform_sky(50, 2)).scene();
+    let plan = plan(&scene, &coarse());
+    let frame = frame(&scene.canopy, &plan.trace);
+    let sources = sources(&scene, &plan.aims, plan.light.seed);
+    let areas_m2 = plan.light.line_areas_m2(&frame.world.extent, &sources);
+    let optics = frame.ordered(&scene.optics);
+    let lit = |kept: &KeptDirections| {
+        let projections = (&sources, &areas_m2[..]);
+        direct_light_keeping(&frame, &optics, projections, 1, kept, || Ok(())).unwrap()
+    };
+    let all = KeptDirections::within(1 << 30);
+    let first = lit(&all);
+    let some = KeptDirections::within(all.bytes() / 2);
+    for kept in [&all, &some, &some, &KeptDirections::default()] {
+        let again = lit(kept);
+        assert_eq!(again.irradiance_W_m2, first.irradiance_W_m2);
+        assert_eq!(again.organ_variance_W2, first.organ_variance_W2);
+    }
+    assert!(some.bytes() > 0 && some.bytes() <= all.bytes() / 2);
 }

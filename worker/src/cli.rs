@@ -1,18 +1,20 @@
 //! The command line of a worker.
 
 use std::fs;
-use std::io::Read;
+use std::io::{Read, Write};
 use std::process::ExitCode;
 use std::thread;
 
 use anyhow::{Context, Result};
 use clap::Parser;
+use nestrad_common::threads::{MOST_THREADS, Threads};
 use nestrad_proto::channel::{Credentials, connect};
+use nestrad_proto::log::Log;
+use nestrad_proto::usage;
 use nestrad_worker::serving::{Offer, serve};
 use tokio::runtime::Builder;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
-use tracing_subscriber::EnvFilter;
 
 /// Computes near-field jobs for a nestrad master.
 ///
@@ -25,7 +27,7 @@ pub(crate) struct Cli {
     #[arg(long, value_name = "URL")]
     master: String,
 
-    /// Number of threads, each with one job at a time; 0 for one per processor
+    /// Number of threads, each with one job at a time; 0 for one per processor, at most 4 for each
     #[arg(long, value_name = "N", default_value_t = 0, value_parser = threads, allow_negative_numbers = true)]
     threads: u32,
 
@@ -46,13 +48,23 @@ pub(crate) struct Cli {
 }
 
 impl Cli {
-    pub(crate) fn run(self) -> ExitCode {
-        let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new("info"));
-        tracing_subscriber::fmt()
-            .with_env_filter(filter)
-            .with_writer(std::io::stderr)
-            .init();
-        match self.serve() {
+    pub(crate) fn run() -> ExitCode {
+        let cli = match Self::try_parse() {
+            Ok(cli) => cli,
+            Err(error) => {
+                usage::say(&error);
+                return u8::try_from(error.exit_code()).map_or(ExitCode::FAILURE, ExitCode::from);
+            }
+        };
+        let _log = match Log::begin("RUST_LOG") {
+            Ok(log) => log,
+            Err(error) => {
+                // nothing can be done about a stderr that is gone
+                let _ = writeln!(std::io::stderr(), "error: {error}");
+                return ExitCode::FAILURE;
+            }
+        };
+        match cli.serve() {
             Ok(()) => ExitCode::SUCCESS,
             Err(error) => {
                 tracing::error!("{error:#}");
@@ -83,7 +95,8 @@ impl Cli {
                 let _ = stop.send(true);
             });
             if self.with_stdin {
-                thread::spawn(die_with_stdin);
+                let watching = thread::Builder::new().spawn(die_with_stdin);
+                watching.context("cannot start threads")?;
             }
             let channel = connect(&self.master, &self.credentials)?;
             serve(channel, offer, stopped).await?;
@@ -94,15 +107,14 @@ impl Cli {
 
     fn offer(&self) -> Offer {
         const GIB: f64 = (1u64 << 30) as f64;
-        let processors = thread::available_parallelism().map_or(1, |n| n.get() as u32);
+        let threads = Threads::asked(self.threads as usize);
+        if let Some(warning) = &threads.warning {
+            tracing::warn!("{warning}");
+        }
         let memory = self.memory.map(|gib| (gib * GIB) as u64);
         Offer {
             name: self.name.clone().unwrap_or_else(host_name),
-            threads: if self.threads == 0 {
-                processors
-            } else {
-                self.threads
-            },
+            threads: threads.count as u32,
             memory_bytes: memory.unwrap_or_else(|| free_memory_bytes() / 4 * 3),
         }
     }
@@ -144,7 +156,10 @@ fn free_memory_bytes() -> u64 {
 }
 
 fn threads(text: &str) -> Result<u32, String> {
-    let number = text.parse().ok().filter(|number| *number <= 4096);
+    let number = text
+        .parse()
+        .ok()
+        .filter(|number| *number <= MOST_THREADS as u32);
     number.ok_or_else(|| "expected a whole number from 0 to 4096".to_owned())
 }
 

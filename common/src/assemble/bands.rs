@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use super::{LoadError, name};
 use crate::canopy::{Canopy, Kind, Material};
 use crate::formats::opt::{Opt, parse};
-use crate::formats::read::{MAX_SMALL_BYTES, read};
+use crate::formats::read::{SMALL, read};
 use crate::formats::{Origins, Place};
 use crate::inputs::BandInput;
 use crate::optics::{Band, LeafOptics};
@@ -28,10 +28,7 @@ pub struct BandOptics {
 impl BandOptics {
     pub(super) fn read(band: &BandInput) -> Result<Self, LoadError> {
         let opt = match &band.optics {
-            Some(path) => Some(parse(
-                &name(path),
-                &read(path, MAX_SMALL_BYTES, "optics (.opt)")?,
-            )?),
+            Some(path) => Some(parse(&name(path), &read(path, SMALL, "optics (.opt)")?)?),
             None => None,
         };
         Ok(Self {

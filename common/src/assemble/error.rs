@@ -2,9 +2,11 @@
 
 use thiserror::Error;
 
-use crate::canopy::Organ;
+use crate::canopy::{MAX_NAME_BYTES, Organ};
+use crate::formats::pattern::MIN_SIDE;
 use crate::formats::{FormatError, MAX_COORDINATE, MAX_TRIANGLES, Place};
 use crate::inputs::LightFault;
+use crate::light::LightError;
 use crate::light::sky::SkyError;
 use crate::optics::OpticsFault;
 use crate::options::OptionFault;
@@ -21,6 +23,9 @@ pub enum LoadError {
     /// The sky cannot be.
     #[error(transparent)]
     Light(#[from] LightFault),
+    /// The light that results cannot be computed with.
+    #[error(transparent)]
+    Irradiance(#[from] LightError),
     /// There is no such sky at that time and place.
     #[error(transparent)]
     Sky(#[from] SkyError),
@@ -105,7 +110,9 @@ pub enum LoadError {
         band: String,
     },
     /// Results could not be told apart.
-    #[error("expected band names that differ and are not empty, found '{name}' twice or empty")]
+    #[error(
+        "expected band names that differ, of 1 to {MAX_NAME_BYTES} bytes, found '{name}' twice, empty or too long"
+    )]
     BandName {
         /// The name.
         name: String,
@@ -127,9 +134,19 @@ pub enum LoadError {
         found: f64,
     },
     /// The corners that were given span no area, or lie too far out.
-    #[error("pattern: expected corners that differ in x and in y, found {found}")]
+    #[error(
+        "pattern: expected corners {MIN_SIDE:e} or more apart in x and in y, in the file's unit and in metres, found {found}"
+    )]
     Pattern {
         /// As given.
         found: String,
+    },
+    /// Parts that are too far from each other.
+    #[error(
+        "the scene, pattern and soil included, extends over {found:e} m, expected at most {MAX_COORDINATE:e} m"
+    )]
+    Extent {
+        /// From the local origin, metres.
+        found: f64,
     },
 }

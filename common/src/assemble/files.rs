@@ -3,8 +3,9 @@
 use std::path::Path;
 
 use super::LoadError;
+use crate::bounded::Limit;
 use crate::formats::pattern::Rectangle;
-use crate::formats::read::{MAX_GEOMETRY_BYTES, MAX_SMALL_BYTES, read};
+use crate::formats::read::{SMALL, read};
 use crate::formats::{self, FormatError, GeometryFile, Place};
 use crate::inputs::{Inputs, PatternInput};
 
@@ -21,12 +22,12 @@ pub fn is_scene_file(path: &Path) -> bool {
 
 /// Reads a scene file. What it leaves out may come from the command line.
 pub fn load_scene_file(path: &Path) -> Result<Inputs, LoadError> {
-    let bytes = read(path, MAX_SMALL_BYTES, "a scene file (.toml)")?;
+    let bytes = read(path, SMALL, "a scene file (.toml)")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     Ok(formats::scene_file::parse(&name(path), &bytes, folder)?)
 }
 
-pub(super) fn read_geometry_file(path: &Path) -> Result<GeometryFile, FormatError> {
+pub(super) fn read_geometry_file(path: &Path, limit: Limit) -> Result<GeometryFile, FormatError> {
     let ending = ending(path);
     if FOREIGN.contains(&ending.as_str()) {
         return Err(FormatError::Content {
@@ -36,7 +37,7 @@ pub(super) fn read_geometry_file(path: &Path) -> Result<GeometryFile, FormatErro
         });
     }
     let expected = "a scene file (.toml), CAN (.can) or OBJ (.obj)";
-    let bytes = read(path, MAX_GEOMETRY_BYTES, expected)?;
+    let bytes = read(path, limit, expected)?;
     match ending.as_str() {
         "obj" => formats::obj::parse(&name(path), &bytes),
         _ => formats::can::parse(&name(path), &bytes),
@@ -46,7 +47,7 @@ pub(super) fn read_geometry_file(path: &Path) -> Result<GeometryFile, FormatErro
 pub(super) fn read_pattern(pattern: &PatternInput) -> Result<Rectangle, LoadError> {
     match pattern {
         PatternInput::File(path) => {
-            let bytes = read(path, MAX_SMALL_BYTES, "a pattern (.8)")?;
+            let bytes = read(path, SMALL, "a pattern (.8)")?;
             Ok(formats::pattern::parse(&name(path), &bytes)?)
         }
         PatternInput::Corners(corners) => {

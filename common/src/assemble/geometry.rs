@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use super::{LoadError, species};
 use crate::canopy::{Canopy, Material, Mesh, Organ, Pattern};
-use crate::formats::pattern::Rectangle;
+use crate::formats::pattern::{MIN_SIDE, Rectangle};
 use crate::formats::{GeometryFile, MAX_COORDINATE, MAX_TRIANGLES, Origins, Place, numbered};
 use crate::options::{Unit, Up};
 
@@ -69,21 +69,38 @@ pub fn build_canopy(geometry: Geometry) -> Result<(Canopy, Origins), LoadError> 
         *vertex = up.stand(*vertex) / per_metre;
         lower = lower.min(*vertex);
     }
-    let pattern = pattern.map(|pattern| {
-        let min = pattern.min / per_metre;
-        lower = min.extend(lower.z);
-        Pattern {
-            min_m: DVec2::ZERO,
-            size_m: pattern.max / per_metre - min,
-        }
-    });
-    joined.vertices().for_each(|vertex| *vertex -= lower);
+    let pattern = pattern
+        .map(|pattern| {
+            let min = pattern.min / per_metre;
+            lower = min.extend(lower.z);
+            let size_m = pattern.max / per_metre - min;
+            if size_m.min_element() < MIN_SIDE {
+                let Rectangle { min, max } = pattern;
+                let found = format!("{} {} {} {}", min.x, min.y, max.x, max.y);
+                return Err(LoadError::Pattern { found });
+            }
+            Ok(Pattern {
+                min_m: DVec2::ZERO,
+                size_m,
+            })
+        })
+        .transpose()?;
+    let soil_z_m = soil.map(|z| z / per_metre - lower.z);
+    let size_m = pattern.map_or(0.0, |pattern| pattern.size_m.max_element());
+    let mut extent_m = size_m.max(soil_z_m.map_or(0.0, f64::abs));
+    for vertex in joined.vertices() {
+        *vertex -= lower;
+        extent_m = extent_m.max(vertex.abs().max_element());
+    }
+    if extent_m > MAX_COORDINATE {
+        return Err(LoadError::Extent { found: extent_m });
+    }
     let mut canopy = Canopy::of_meshes(joined.meshes);
     canopy.organs = joined.organs;
     canopy.materials = joined.materials;
     canopy.origin_m = lower;
     canopy.pattern = pattern;
-    canopy.soil_z_m = soil.map(|z| z / per_metre - lower.z);
+    canopy.soil_z_m = soil_z_m;
     Ok((canopy, joined.origins))
 }
 

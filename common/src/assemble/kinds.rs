@@ -1,6 +1,6 @@
 //! What the materials of a canopy are declared to count as.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use crate::canopy::{Canopy, Kind, Material};
 use crate::inputs::Inputs;
@@ -15,6 +15,23 @@ pub(super) fn declared(inputs: &Inputs, canopy: &Canopy) -> BTreeMap<Material, K
     let materials = canopy.materials.iter();
     materials
         .filter_map(|material| Some((material.clone(), of(material)?)))
+        .collect()
+}
+
+/// The named materials that are declared to be stems and let no light through in any band.
+pub(super) fn opaque_stems(inputs: &Inputs, canopy: &Canopy) -> BTreeSet<Material> {
+    let is_clear = |name: &String| {
+        let optics = inputs.bands.iter().map(|band| band.materials.get(name));
+        optics
+            .flatten()
+            .any(|optics| optics.upper.tau + optics.lower.tau > 0.0)
+    };
+    let declared = canopy.declared.iter();
+    declared
+        .filter(|&(material, &kind)| {
+            matches!(material, Material::Named(name) if kind == Kind::Stem && !is_clear(name))
+        })
+        .map(|(material, _)| material.clone())
         .collect()
 }
 

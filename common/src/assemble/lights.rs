@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::{LoadError, name};
 use crate::formats::light::{LightSource, parse};
-use crate::formats::read::{MAX_SMALL_BYTES, read};
+use crate::formats::read::{SMALL, read};
 use crate::light::Source;
 
 /// The sources of a `.light` file and the bands they shine in.
@@ -19,7 +19,7 @@ pub struct LightFile {
 
 impl LightFile {
     pub(super) fn read(path: &Path) -> Result<Self, LoadError> {
-        let bytes = read(path, MAX_SMALL_BYTES, "light (.light)")?;
+        let bytes = read(path, SMALL, "light (.light)")?;
         Ok(Self {
             sources: parse(&name(path), &bytes)?,
             band: None,

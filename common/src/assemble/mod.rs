@@ -13,8 +13,9 @@ mod tests;
 
 use std::sync::Arc;
 
-use crate::canopy::Canopy;
-use crate::formats::{GeometryFile, Origins};
+use crate::canopy::{Canopy, MAX_NAME_BYTES};
+use crate::formats::Origins;
+use crate::formats::read::{SMALL, geometry_limit};
 use crate::inputs::{Inputs, LightInput};
 use crate::inspection::{Inspection, inspect};
 use crate::light::{Light, Source};
@@ -83,7 +84,7 @@ const NO_SCENE: LoadError = LoadError::Missing {
 /// The light of an input, which is the same for whoever solves: here, or a master elsewhere.
 fn light(input: &LightInput, bands: &[String]) -> Result<Light, LoadError> {
     let of_files = |suns: Vec<Source>| Light { suns, sky: None };
-    Ok(match input {
+    let light = match input {
         LightInput::File(path) => of_files(merge_sources(&[LightFile::read(path)?], bands.len())),
         LightInput::Files(files) => {
             let files = lights::per_band(files, bands)?;
@@ -93,7 +94,9 @@ fn light(input: &LightInput, bands: &[String]) -> Result<Light, LoadError> {
             sky,
             irradiance_W_m2,
         } => sky.light(lights::values_per_band(irradiance_W_m2, bands)?)?,
-    })
+    };
+    light.check(bands.iter().map(String::as_str))?;
+    Ok(light)
 }
 
 /// Reads the geometry and looks through it.
@@ -117,12 +120,21 @@ pub fn load_canopy(inputs: &Inputs) -> Result<Canopy, LoadError> {
 fn canopy_of(geometry: Geometry, inputs: &Inputs) -> Result<(Canopy, Origins), LoadError> {
     let (mut canopy, origins) = build_canopy(geometry)?;
     canopy.declared = kinds::declared(inputs, &canopy);
+    canopy.opaque_stems = kinds::opaque_stems(inputs, &canopy);
     Ok((canopy, origins))
 }
 
 fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {
-    let files = inputs.scenes.iter();
-    let files = files.map(|path| files::read_geometry_file(path));
+    let mut limit = geometry_limit(inputs.options.memory_GiB);
+    let mut files = Vec::with_capacity(inputs.scenes.len());
+    for path in &inputs.scenes {
+        let file = files::read_geometry_file(path, limit)?;
+        limit.bytes = limit
+            .bytes
+            .saturating_sub(file.mesh.bytes())
+            .max(SMALL.bytes);
+        files.push(file);
+    }
     Ok(Geometry {
         pattern: inputs
             .pattern
@@ -132,7 +144,7 @@ fn read_geometry(inputs: &Inputs) -> Result<Geometry, LoadError> {
         soil: inputs.soil,
         unit: inputs.unit.unwrap_or_default(),
         up: inputs.up.unwrap_or_default(),
-        files: files.collect::<Result<Vec<GeometryFile>, _>>()?,
+        files,
     })
 }
 
@@ -144,8 +156,10 @@ fn band_names(inputs: &Inputs) -> Result<Vec<String>, LoadError> {
         });
     }
     for (index, name) in names.iter().enumerate() {
-        if name.is_empty() || names[..index].contains(name) {
-            return Err(LoadError::BandName { name: name.clone() });
+        let length = 1..=MAX_NAME_BYTES;
+        if !length.contains(&name.len()) || names[..index].contains(name) {
+            let name = name.chars().take(40).collect();
+            return Err(LoadError::BandName { name });
         }
     }
     Ok(names)

@@ -7,7 +7,7 @@ mod solids;
 mod solids_tests;
 mod weld;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 
 use glam::{DAffine3, DVec2, DVec3};
@@ -17,6 +17,9 @@ pub use kind::Kind;
 pub use mesh::{Mesh, Triangle};
 pub use solids::Solids;
 pub use weld::Welder;
+
+/// Longest name of an organ, plant, species, material or band, bytes.
+pub const MAX_NAME_BYTES: usize = 4096;
 
 /// A canopy ready to be computed: checked, in metres, moved to a local origin.
 ///
@@ -35,6 +38,9 @@ pub struct Canopy {
     pub materials: Vec<Material>,
     /// What materials count as that the user declared; the others count as what they are ([`Material::kind`]).
     pub declared: BTreeMap<Material, Kind>,
+    /// What is solid where it encloses something, besides CAN's stems: named materials that are declared to be stems and
+    /// let no light through.
+    pub opaque_stems: BTreeSet<Material>,
     /// What was subtracted from the user's coordinates (already in metres).
     pub origin_m: DVec3,
     /// The rectangle on which the canopy repeats for ever; `None` for an isolated scene.
@@ -129,11 +135,12 @@ impl Canopy {
     }
 
     /// Whether the lower faces of each material may be the inside of something solid: of CAN's stems, unless they are
-    /// declared to be a structure, which has two faces.
+    /// declared to be a structure, which has two faces, and of named materials that are opaque stems.
     pub fn may_be_solid(&self) -> Vec<bool> {
         let kinds = self.kinds().into_iter().zip(&self.materials);
         let solid = |(kind, material): (Kind, &Material)| {
-            matches!(material, Material::Stem { .. }) && kind != Kind::Structure
+            let stem = matches!(material, Material::Stem { .. });
+            (stem && kind != Kind::Structure) || self.opaque_stems.contains(material)
         };
         kinds.map(solid).collect()
     }

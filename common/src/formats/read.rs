@@ -1,18 +1,36 @@
 //! Files to bytes: the only place where a format touches the file system.
 
-use std::fs::File;
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
 use flate2::read::MultiGzDecoder;
 
 use super::error::FormatError;
+use super::lines::MAX_LINE_BYTES;
+use crate::bounded::{self, GZIP, Limit};
+use crate::options::DEFAULT_MEMORY_GIB;
 
 /// Geometry files, before and after decompression: 8 GiB is about 70 million triangles of text.
 pub const MAX_GEOMETRY_BYTES: u64 = 8 << 30;
 
 /// All other files are written by hand or hold a few numbers.
-pub const MAX_SMALL_BYTES: u64 = 16 << 20;
+pub const SMALL: Limit = Limit::fixed(16 << 20);
+
+/// What a geometry file may take of the memory that a solve may take: a canopy takes more than its text.
+pub fn geometry_limit(memory_GiB: Option<f64>) -> Limit {
+    let half_GiB = 0.5 * memory_GiB.unwrap_or(DEFAULT_MEMORY_GIB);
+    let half = (half_GiB * f64::from(1 << 30)) as u64;
+    let of = if half < MAX_GEOMETRY_BYTES {
+        "half of --memory"
+    } else {
+        ""
+    };
+    Limit {
+        bytes: half.clamp(SMALL.bytes, MAX_GEOMETRY_BYTES),
+        of,
+        line_bytes: Some(MAX_LINE_BYTES),
+    }
+}
 
 /// Text of coordinates shrinks 5 to 10 times; a file that swells more than this is a bomb.
 pub const MAX_GZIP_RATIO: u64 = 100;
@@ -20,10 +38,9 @@ pub const MAX_GZIP_RATIO: u64 = 100;
 /// Below this size the ratio is not looked at: little files of zeros are harmless.
 const GZIP_RATIO_FROM_BYTES: u64 = 64 << 20;
 
-/// The whole content of a file of at most `limit` bytes. Gzip is recognised by its first bytes,
-/// whatever the file's name; its content is held to `limit` too, and to [`MAX_GZIP_RATIO`]. `expected` says in messages
-/// what kind of file it should be.
-pub fn read(path: &Path, limit: u64, expected: &str) -> Result<Vec<u8>, FormatError> {
+/// The whole content of a file. Gzip is recognised by its first bytes, whatever the file's name; its content is held to
+/// `limit` too, and to [`MAX_GZIP_RATIO`]. `expected` says in messages what kind of file it should be.
+pub fn read(path: &Path, limit: Limit, expected: &str) -> Result<Vec<u8>, FormatError> {
     let fault = |source: io::Error| FormatError::Read {
         file: path.display().to_string(),
         source: match source.kind() {
@@ -38,11 +55,7 @@ pub fn read(path: &Path, limit: u64, expected: &str) -> Result<Vec<u8>, FormatEr
             _ => source,
         },
     };
-    let file = File::open(path).map_err(fault)?;
-    if file.metadata().map_err(fault)?.is_dir() {
-        return Err(fault(ErrorKind::IsADirectory.into()));
-    }
-    let stored = up_to(file, limit, "the file").map_err(fault)?;
+    let stored = bounded::read(path, limit).map_err(fault)?;
     gunzip(stored, limit).map_err(fault)
 }
 
@@ -57,25 +70,23 @@ fn scene_in(folder: &Path) -> String {
 }
 
 /// Decompresses what begins as gzip does; gives back anything else as it is.
-pub fn gunzip(stored: Vec<u8>, limit: u64) -> io::Result<Vec<u8>> {
-    if !stored.starts_with(&[0x1f, 0x8b]) {
+pub fn gunzip(stored: Vec<u8>, limit: Limit) -> io::Result<Vec<u8>> {
+    if !stored.starts_with(GZIP) {
         return Ok(stored);
     }
     let swollen = (stored.len() as u64).saturating_mul(MAX_GZIP_RATIO);
-    let limit = limit.min(swollen.max(GZIP_RATIO_FROM_BYTES));
-    up_to(MultiGzDecoder::new(&stored[..]), limit, "the unpacked file")
-}
-
-fn up_to(source: impl Read, limit: u64, what: &str) -> io::Result<Vec<u8>> {
+    let swollen = Limit::fixed(swollen.max(GZIP_RATIO_FROM_BYTES));
+    let limit = if limit.bytes <= swollen.bytes {
+        limit
+    } else {
+        swollen
+    };
     let mut bytes = Vec::new();
-    source
-        .take(limit.saturating_add(1))
+    MultiGzDecoder::new(&stored[..])
+        .take(limit.bytes.saturating_add(1))
         .read_to_end(&mut bytes)?;
-    if bytes.len() as u64 > limit {
-        return Err(io::Error::new(
-            ErrorKind::FileTooLarge,
-            format!("{what} is larger than {limit} bytes"),
-        ));
+    if bytes.len() as u64 > limit.bytes {
+        return Err(limit.exceeded("the unpacked file"));
     }
     Ok(bytes)
 }
@@ -105,7 +116,7 @@ mod tests {
         ] {
             let path = folder.path().join(name);
             std::fs::write(&path, bytes).unwrap();
-            assert_eq!(read(&path, 100, "text").unwrap(), b"text");
+            assert_eq!(read(&path, Limit::fixed(100), "text").unwrap(), b"text");
         }
     }
 
@@ -114,7 +125,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let missing = folder.path().join("no.can");
         let said = |path: &Path| {
-            let error = read(path, 100, "text").unwrap_err().to_string();
+            let error = read(path, Limit::fixed(100), "text")
+                .unwrap_err()
+                .to_string();
             let file = format!("{}: cannot be read: ", path.display());
             error.strip_prefix(&file).unwrap().to_owned()
         };
@@ -134,12 +147,15 @@ mod tests {
     fn truncated_and_garbled_gzip_is_refused() {
         let whole = gzip(b"p 1 100001001001 3 0 0 1 1 0 1 0 1 1\n");
         for end in 2..whole.len() {
-            assert!(gunzip(whole[..end].to_vec(), 1000).is_err(), "{end}");
+            assert!(
+                gunzip(whole[..end].to_vec(), Limit::fixed(1000)).is_err(),
+                "{end}"
+            );
         }
         let mut garbled = whole.clone();
         garbled[20] ^= 0x55;
-        assert!(gunzip(garbled, 1000).is_err());
-        assert!(gunzip([whole, b"rest".to_vec()].concat(), 1000).is_err());
+        assert!(gunzip(garbled, Limit::fixed(1000)).is_err());
+        assert!(gunzip([whole, b"rest".to_vec()].concat(), Limit::fixed(1000)).is_err());
     }
 
     #[test]
@@ -147,12 +163,16 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("large");
         std::fs::write(&path, [b'x'; 101]).unwrap();
-        let error = read(&path, 100, "text").unwrap_err().to_string();
+        let error = read(&path, Limit::fixed(100), "text")
+            .unwrap_err()
+            .to_string();
         assert!(
             error.ends_with("the file is larger than 100 bytes"),
             "{error}"
         );
-        let error = gunzip(gzip(&[0; 1001]), 1000).unwrap_err().to_string();
+        let error = gunzip(gzip(&[0; 1001]), Limit::fixed(1000))
+            .unwrap_err()
+            .to_string();
         assert_eq!(error, "the unpacked file is larger than 1000 bytes");
     }
 
@@ -160,7 +180,9 @@ mod tests {
     fn a_gzip_bomb_is_stopped_long_before_the_limit_of_the_file() {
         let bomb = gzip(&vec![b'\n'; 100 << 20]);
         assert!(bomb.len() < 600_000);
-        let error = gunzip(bomb, MAX_GEOMETRY_BYTES).unwrap_err().to_string();
-        assert_eq!(error, "the unpacked file is larger than 67108864 bytes");
+        let error = gunzip(bomb, Limit::fixed(MAX_GEOMETRY_BYTES))
+            .unwrap_err()
+            .to_string();
+        assert_eq!(error, "the unpacked file is larger than 64.000 MiB");
     }
 }

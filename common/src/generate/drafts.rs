@@ -9,15 +9,21 @@ use flate2::CrcWriter;
 use tempfile::TempDir;
 
 use super::error::WriteError;
+use crate::bounded::{self, Limit};
+use crate::formats::read::MAX_GEOMETRY_BYTES;
 
 /// Begins the last line; eight hexadecimal digits end it.
 const LAST: &str = "# as nestrad generate wrote it: crc32 ";
 
+/// Nothing larger is generated.
+const LARGEST: Limit = Limit::fixed(MAX_GEOMETRY_BYTES);
+
 /// Whether a file is, to the byte, what was generated once, or is not there at all.
 pub(super) fn is_own(path: &Path) -> io::Result<bool> {
-    let bytes = match fs::read(path) {
+    let bytes = match bounded::read(path, LARGEST) {
         Ok(bytes) => bytes,
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(true),
+        Err(error) if error.kind() == ErrorKind::FileTooLarge => return Ok(false),
         Err(error) => return Err(error),
     };
     let last_len = LAST.len() + 9;

@@ -1,5 +1,6 @@
 //! Light that falls on the canopy: parallel sources, and a sky.
 
+mod check;
 pub mod sky;
 mod spec;
 pub mod sun;
@@ -9,6 +10,7 @@ use std::num::NonZeroUsize;
 
 use glam::DVec3;
 
+pub use check::{LightError, Origin};
 pub use sky::SkyLight;
 pub use spec::Sky;
 

@@ -12,9 +12,10 @@ use nestrad_engine::exchange::{BlockOf, JobRows};
 use nestrad_kernel::Block;
 use nestrad_proto::v1;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
-use tokio::sync::{Notify, Semaphore};
+use tokio::sync::Notify;
 
 use crate::blocks::SentBlock;
+use crate::room::Room;
 use crate::scheduler::{Id, Rules, Scheduler, SolveCounts, Time, WorkerCounts};
 use crate::sending::Turns;
 
@@ -25,11 +26,11 @@ pub struct WorkerLimits {
     pub rules: Rules,
     /// How often a worker is to be heard of.
     pub heartbeat: Duration,
-    /// Bytes of results that are on their way in at a time; no single result is larger.
+    /// Bytes of results that are on their way in at a time; no single result is larger than half of it.
     pub result_bytes: u32,
     /// Workers at a time.
     pub workers: usize,
-    /// Without any worker for so long, the master computes by itself.
+    /// Without any worker, or without progress of those that are there, for so long, the master computes by itself.
     pub patience: Duration,
     /// The share of the workers' jobs that the master computes again, 0 to 1.
     pub audit: f64,
@@ -71,8 +72,8 @@ pub(crate) struct Shared {
     pub(crate) changed: Notify,
     /// A worker has joined.
     pub(crate) joined: Condvar,
-    /// Kibibytes of results that may come in now.
-    pub(crate) room: Semaphore,
+    /// For results that come in.
+    pub(crate) room: Room,
     /// Who is sent a block now.
     pub(crate) turns: Turns,
     /// Where rows are checked and joined.
@@ -89,8 +90,12 @@ pub(crate) struct ClusterState {
     pub(crate) draining: bool,
     /// Workers are told to come back later.
     pub(crate) closed: bool,
-    /// Why nothing can be computed any more.
-    pub(crate) failed: Option<String>,
+    /// No worker will come any more.
+    pub(crate) deserted: bool,
+    /// What the user may want to know, each once.
+    pub(crate) remarks: Vec<String>,
+    /// The master computes by itself: there is no room for workers.
+    pub(crate) alone: bool,
     /// Workers that returned wrong rows.
     pub(crate) refused: Vec<Arc<str>>,
 }
@@ -178,8 +183,8 @@ impl fmt::Debug for Cluster {
 
 impl Cluster {
     /// A cluster without workers, that checks and joins rows on so many threads, 0 for one per
-    /// processor. To be called within a tokio runtime.
-    pub fn start(limits: WorkerLimits, threads: usize) -> Result<Self, ThreadPoolBuildError> {
+    /// processor. Somebody is to [keep watch](Self::keep_watch) over it.
+    pub fn new(limits: WorkerLimits, threads: usize) -> Result<Self, ThreadPoolBuildError> {
         let compute = ThreadPoolBuilder::new().num_threads(threads).build()?;
         // what a master before this one gave out is not to be taken for this one's
         let first_id = RandomState::new().hash_one(Instant::now()) >> 1;
@@ -190,20 +195,26 @@ impl Cluster {
                 solves: HashMap::new(),
                 draining: false,
                 closed: false,
-                failed: None,
+                deserted: false,
+                remarks: Vec::new(),
+                alone: false,
                 refused: Vec::new(),
             }),
             changed: Notify::new(),
             joined: Condvar::new(),
             turns: Turns::new(),
-            room: Semaphore::new(kibibytes(u64::from(limits.result_bytes)) as usize),
+            room: Room::new(u64::from(limits.result_bytes)),
             compute,
             totals: Totals::default(),
             key: RandomState::new(),
             limits,
         });
-        tokio::spawn(watch(Arc::downgrade(&shared)));
         Ok(Self(shared))
+    }
+
+    /// Takes back what is overdue, for as long as there is a cluster.
+    pub fn keep_watch(&self) -> impl Future<Output = ()> + Send + use<> {
+        watch(Arc::downgrade(&self.0))
     }
 
     /// Tells all workers to leave as soon as they ask for a job.
@@ -218,9 +229,25 @@ impl Cluster {
         self.0.changed.notify_waiters();
     }
 
-    /// Ends all solves, now and later: there will be no workers.
-    pub fn fail(&self, reason: &str) {
-        self.lock().failed = Some(reason.to_owned());
+    /// There are no workers any more, and there will be none: the master computes by itself.
+    pub fn desert(&self, reason: &str) {
+        let now = self.now();
+        let mut state = self.lock();
+        state.deserted = true;
+        state.scheduler.all_leave(now);
+        state.remark(format!("{reason}: the master computes by itself"));
+        drop(state);
+        self.0.joined.notify_all();
+    }
+
+    /// What the user may want to know of the workers, each thing once.
+    pub fn remarks(&self) -> Vec<String> {
+        self.lock().remarks.clone()
+    }
+
+    /// Says whether the master is to compute by itself from now on, or workers for it.
+    pub fn set_alone(&self, alone: bool) {
+        self.lock().alone = alone;
     }
 
     /// Whether anybody is there to compute.
@@ -282,11 +309,22 @@ impl Cluster {
 
 /// Workers that are remembered as refused: the last ones.
 const MOST_REFUSED: usize = 4096;
+/// Remarks that are kept.
+const MOST_REMARKS: usize = 100;
+
+impl ClusterState {
+    /// Notes what the user may want to know; once, however often it is so.
+    pub(crate) fn remark(&mut self, remark: String) {
+        if self.remarks.len() < MOST_REMARKS && !self.remarks.contains(&remark) {
+            tracing::warn!("{remark}");
+            self.remarks.push(remark);
+        }
+    }
+}
 
 /// How often it is looked whether leases are overdue, or jobs take too long.
 const TICK: Duration = Duration::from_millis(100);
 
-/// Takes back what is overdue, for as long as there is a cluster.
 async fn watch(cluster: Weak<Shared>) {
     let mut tick = tokio::time::interval(TICK);
     tick.set_missed_tick_behavior(tokio::time::MissedTickBehavior::Delay);

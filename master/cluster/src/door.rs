@@ -4,13 +4,15 @@ use std::io;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
+use nestrad_common::panics::Panic;
+use nestrad_engine::causes::causes;
 use nestrad_proto::access::{Access, AccessError};
+use nestrad_proto::connections::{ConnectionLimits, Connections};
 use rayon::ThreadPoolBuildError;
 use thiserror::Error;
 use tokio::net::TcpListener;
 use tokio::runtime::{Builder, Runtime};
 use tokio::sync::oneshot;
-use tonic::transport::server::TcpIncoming;
 
 use crate::cluster::{Cluster, WorkerLimits};
 use crate::service::worker_service;
@@ -71,21 +73,37 @@ impl Door {
             .block_on(TcpListener::bind(address))
             .map_err(listen)?;
         let at = listener.local_addr().map_err(listen)?;
-        let cluster = Cluster::start(limits, threads)?;
-        let mut server = access.server(at)?;
+        let connections = Connections::new(ConnectionLimits::default().within_open_files());
+        let mut server = access.server(at, &connections)?;
+        let cluster = Cluster::new(limits, threads)?;
         let (close, closed) = oneshot::channel();
+        let watching = cluster.keep_watch();
         let serving = server
             .add_service(worker_service(cluster.clone()))
-            .serve_with_incoming_shutdown(
-                TcpIncoming::from(listener).with_nodelay(Some(true)),
-                async {
-                    // the sender that is gone closes, too
-                    let _ = closed.await;
-                },
-            );
-        runtime.spawn(async {
-            if let Err(error) = serving.await {
-                tracing::error!(%error, "the service for workers failed");
+            .serve_with_incoming_shutdown(connections.incoming(listener), async {
+                // the sender that is gone closes, too
+                let _ = closed.await;
+            });
+        // without either, workers cannot be waited for
+        let both = async move {
+            tokio::select! {
+                served = serving => served.map_err(|error| causes(&error)),
+                () = watching => Ok(()),
+            }
+        };
+        let (guarded, failing) = (runtime.spawn(both), cluster.clone());
+        runtime.spawn(async move {
+            match guarded.await {
+                Ok(Ok(())) => {}
+                Ok(Err(reason)) => {
+                    failing.desert(&format!("the service for workers failed: {reason}"))
+                }
+                Err(error) if error.is_panic() => {
+                    let panic = Panic::of(&*error.into_panic());
+                    failing.desert(&format!("internal fault: {panic}"));
+                }
+                // the door is closed
+                Err(_) => {}
             }
         });
         drop(entered);

@@ -18,6 +18,7 @@ pub mod kept;
 pub mod local;
 mod patience;
 mod receive;
+mod room;
 mod rows;
 pub mod scheduler;
 mod sending;

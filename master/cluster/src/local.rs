@@ -79,7 +79,7 @@ impl LocalWorkers {
                 if !lives && !told {
                     told = true;
                     let n = children.len();
-                    cluster.fail(&format!("all {n} worker processes have ended"));
+                    cluster.desert(&format!("all {n} worker processes have ended"));
                 }
             }
             stop(children, FAREWELL);
@@ -126,6 +126,9 @@ fn command(program: &PathBuf, door: &Door, share: Share, k: u32) -> Command {
 /// Ends processes: those that do not end in time by themselves are killed.
 fn stop(mut children: Vec<Child>, patience: Duration) {
     let begun = Instant::now();
+    for child in &mut children {
+        drop(child.stdin.take());
+    }
     loop {
         children.retain_mut(|child| matches!(child.try_wait(), Ok(None)));
         if children.is_empty() || begun.elapsed() >= patience {

@@ -13,6 +13,8 @@ use nestrad_proto::near_field;
 use nestrad_proto::v1::{self, ReturnRowsRequest, RowsHeader, return_rows_request};
 use tonic::{Code, Status, Streaming};
 
+use crate::room::Coming;
+
 /// What a result has to fit.
 #[derive(Clone)]
 pub(crate) struct Wanted {
@@ -124,11 +126,12 @@ pub(crate) fn check_header(header: &RowsHeader, wanted: &Wanted) -> Result<(), S
 pub(crate) async fn body(
     stream: &mut Streaming<ReturnRowsRequest>,
     header: &RowsHeader,
+    coming: &mut Coming<'_>,
     patience: Duration,
 ) -> Result<Vec<u8>, Status> {
     let size = header.packed_bytes as usize;
     let mut body = Vec::with_capacity(size);
-    while let Some(part) = next(stream, patience).await? {
+    while let Some(part) = coming.wait(next(stream, patience), patience).await?? {
         let return_rows_request::Part::Chunk(chunk) = part else {
             return Err(Status::invalid_argument("expected a chunk, found a header"));
         };
@@ -137,6 +140,7 @@ pub(crate) async fn body(
             let text = format!("result of {found} bytes or more, expected {size}");
             return Err(Status::invalid_argument(text));
         }
+        coming.came(chunk.len());
         body.extend_from_slice(&chunk);
     }
     if body.len() < size {
@@ -165,7 +169,10 @@ pub(crate) fn check_body(
     Ok(JobRows::Packed(rows.into()))
 }
 
-/// Whether an error says that the result is bad, rather than that the connection is.
+/// Whether an error says that the result is bad or comes too slowly, rather than that the connection is gone.
 pub(crate) fn is_fault(status: &Status) -> bool {
-    matches!(status.code(), Code::InvalidArgument | Code::DataLoss)
+    matches!(
+        status.code(),
+        Code::InvalidArgument | Code::DataLoss | Code::DeadlineExceeded
+    )
 }

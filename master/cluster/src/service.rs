@@ -7,6 +7,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use bytes::Bytes;
+use nestrad_common::panics;
 use nestrad_engine::exchange::JobRows;
 use nestrad_proto::MAX_MESSAGE_BYTES;
 use nestrad_proto::v1::worker_service_server::{WorkerService, WorkerServiceServer};
@@ -19,9 +20,9 @@ use nestrad_proto::v1::{
 use tokio::sync::oneshot;
 use tonic::{Request, Response, Status, Streaming};
 
-use crate::cluster::{Brought, Cluster, ClusterState, kibibytes};
+use crate::cluster::{Brought, Cluster, ClusterState};
 use crate::receive::{self, Wanted};
-use crate::scheduler::{BlockId, Id, Leased, Refusal, WorkerFacts};
+use crate::scheduler::{BlockId, Id, Identity, Leased, Refusal, WorkerFacts};
 use crate::sending::Sending;
 
 /// Longest wait for a job.
@@ -114,8 +115,13 @@ impl WorkerService for Service {
             if let Some(answer) = cluster.lease_now(asked.worker_id, &held)? {
                 break answer;
             }
-            if tokio::time::timeout_at(until, changed).await.is_err() {
-                break lease_response::Answer::Nothing(Nothing {});
+            let (needs, is_news) = cluster.too_small(asked.worker_id);
+            let is_over = || tokio::time::timeout_at(until, changed);
+            if is_news || is_over().await.is_err() {
+                let nothing = Nothing {
+                    needs_memory_bytes: needs,
+                };
+                break lease_response::Answer::Nothing(nothing);
             }
         };
         Ok(Response::new(LeaseResponse {
@@ -154,6 +160,11 @@ impl WorkerService for Service {
         request: Request<RenewRequest>,
     ) -> Result<Response<RenewResponse>, Status> {
         let asked = request.into_inner();
+        let most = 2 * MOST_THREADS as usize;
+        if asked.lease_ids.len() > most {
+            let text = format!("lease_ids: expected at most {most}");
+            return Err(Status::invalid_argument(text));
+        }
         let now = self.0.now();
         let mut state = self.0.lock();
         let unwanted = state
@@ -189,7 +200,8 @@ impl WorkerService for Service {
         request: Request<LeaveRequest>,
     ) -> Result<Response<LeaveResponse>, Status> {
         let worker = request.into_inner().worker_id;
-        self.0.lock().scheduler.leave(worker);
+        let now = self.0.now();
+        self.0.lock().scheduler.leave(now, worker);
         self.0.0.changed.notify_waiters();
         tracing::info!("worker leaves");
         Ok(Response::new(LeaveResponse {}))
@@ -234,6 +246,26 @@ impl Cluster {
         Ok(job.map(lease_response::Answer::Job))
     }
 
+    /// Memory that the smallest block needs of a worker that has less, bytes, and whether it does not know yet; 0
+    /// where it has enough.
+    fn too_small(&self, worker: Id) -> (u64, bool) {
+        const GIB: f64 = (1u64 << 30) as f64;
+        let mut state = self.lock();
+        let Some((needs, is_news)) = state.scheduler.tell_too_small(worker) else {
+            return (0, false);
+        };
+        if is_news && let Some(facts) = state.scheduler.facts_of(worker) {
+            let remark = format!(
+                "worker '{}' is idle: the smallest block needs {:.2} GiB of its memory, it has {:.2} GiB",
+                facts.name,
+                needs as f64 / GIB,
+                facts.memory_bytes as f64 / GIB
+            );
+            state.remark(remark);
+        }
+        (needs, is_news)
+    }
+
     fn given_back(&self, worker: Id, lease: Id, failure: Option<&str>) -> Result<(), Status> {
         let now = self.now();
         if let Some(reason) = failure {
@@ -263,10 +295,9 @@ impl Cluster {
         let taken = async {
             receive::check_header(&header, &wanted)?;
             let (said, of) = (header.clone(), wanted.clone());
-            let expected = self.compute(move || of.job(&said)).await??;
-            let room = self.0.room.acquire_many(kibibytes(header.packed_bytes));
-            let _room = room.await.map_err(|_| Status::cancelled("master ends"))?;
-            let body = receive::body(&mut stream, &header, patience).await?;
+            let expected = self.compute(move || of.job(&said)).await?;
+            let mut coming = self.0.room.enter(header.packed_bytes).await?;
+            let body = receive::body(&mut stream, &header, &mut coming, patience).await?;
             let bytes = body.len() as u64;
             self.0.totals.bytes_in.fetch_add(bytes, Ordering::Relaxed);
             let cluster = self.clone();
@@ -275,7 +306,7 @@ impl Cluster {
                 cluster.look_again(&header, &wanted, &rows)?;
                 Ok(cluster.hand_on(&header, rows))
             })
-            .await?
+            .await
         };
         let taken: Result<bool, Status> = taken.await;
         if let Err(status) = &taken
@@ -290,15 +321,18 @@ impl Cluster {
     /// Has something computed where rows are checked.
     async fn compute<T: Send + 'static>(
         &self,
-        what: impl FnOnce() -> T + Send + 'static,
+        what: impl FnOnce() -> Result<T, Status> + Send + 'static,
     ) -> Result<T, Status> {
         let (sender, done) = oneshot::channel();
         self.0.compute.spawn(move || {
+            // a fault of the program is that of this result, not the end of the master
+            let fault = |panic| Err(Status::internal(format!("internal fault: {panic}")));
+            let done = panics::caught(what).unwrap_or_else(fault);
             // nobody listens where the worker is gone
-            let _ = sender.send(what());
+            let _ = sender.send(done);
         });
         let gone = |_| Status::internal("result was not checked");
-        done.await.map_err(gone)
+        done.await.map_err(gone)?
     }
 
     /// Traces a few lines again, by chance; a worker that says other than what they see is refused.
@@ -346,7 +380,7 @@ impl Cluster {
                 known: open.blocks[leased.block].known.clone(),
                 batch: open.batches.get(leased.job)?.clone(),
                 cost_s: *open.costs_s.get(leased.job)?,
-                most_bytes: u64::from(self.0.limits.result_bytes),
+                most_bytes: self.0.room.most_bytes(),
             })
         }))
     }
@@ -360,10 +394,13 @@ impl Cluster {
         let counts = rows.counts();
         let mut state = self.lock();
         let leased = state.scheduler.finish(now, worker, lease, compute_s);
-        let identity = state.scheduler.identity(worker);
+        let who = state
+            .scheduler
+            .facts_of(worker)
+            .map(|facts| facts.who.clone());
         if let Some(leased) = leased
             && let Some(open) = state.solves.get(&leased.solve)
-            && let Some(worker) = identity
+            && let Some(worker) = who
             && let Ok(checksum) = <[u8; 32]>::try_from(&header.checksum[..])
         {
             add(&totals.results, 1);
@@ -384,25 +421,39 @@ impl Cluster {
 /// What a master sees of a worker by itself.
 struct Seen {
     address: Option<IpAddr>,
-    /// Digest of its certificate.
-    certificate: Option<String>,
+    certificate: Option<Vec<u8>>,
 }
 
 impl Seen {
     fn of<T>(request: &Request<T>) -> Self {
         let certificates = request.peer_certs();
-        let own = certificates.as_ref().and_then(|chain| chain.first());
+        let own = certificates.as_deref().and_then(|chain| chain.first());
         Self {
             address: request.remote_addr().map(|address| address.ip()),
-            certificate: own.map(|own| blake3::hash(own).to_hex()[..16].to_owned()),
+            certificate: own.map(|own| own.to_vec()),
         }
     }
 
-    /// Who that is: nobody else has its certificate; without one, its address and its name have to do.
-    fn identity(&self, name: &str) -> Arc<str> {
+    /// By what a worker is known when it comes again: its certificate where it has one, else its address; and its name.
+    fn identity(&self, name: &str) -> Identity {
+        let address = self.address.map(|address| address.to_string());
+        let peer = match (&self.certificate, &address) {
+            (Some(certificate), _) => &certificate[..],
+            (None, Some(address)) => address.as_bytes(),
+            (None, None) => &[],
+        };
+        let mut identity = blake3::Hasher::new();
+        identity.update(&(peer.len() as u64).to_le_bytes());
+        identity.update(peer).update(name.as_bytes());
+        *identity.finalize().as_bytes()
+    }
+
+    /// Who that is, for people to read: nobody else has its certificate; without one, its address and its name have to
+    /// do.
+    fn who(&self, name: &str) -> Arc<str> {
         let address = self.address.map(|address| address.to_string());
         match &self.certificate {
-            Some(digest) => format!("with certificate {digest}"),
+            Some(own) => format!("with certificate {}", &blake3::hash(own).to_hex()[..16]),
             None => format!("{name} at {}", address.as_deref().unwrap_or("?")),
         }
         .into()
@@ -420,7 +471,8 @@ fn facts(asked: &JoinRequest, seen: &Seen) -> Result<WorkerFacts, Status> {
     }
     let name = shown(&asked.name, LONGEST_NAME);
     Ok(WorkerFacts {
-        identity: seen.identity(&name),
+        identity: seen.identity(&asked.name),
+        who: seen.who(&name),
         name,
         threads: asked.threads,
         memory_bytes: asked.memory_bytes,

@@ -1,13 +1,15 @@
 //! Workers as a source of rows.
 
+use std::collections::VecDeque;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 use nestrad_engine::exchange::{
-    ExchangeError, JobCounts, JobRows, Origin, Ready, RowSource, Sampling, SmallestWorker, Take,
-    ThisProcess, Work, partition,
+    BlockOf, ExchangeError, JobCounts, JobRows, Origin, Ready, RowSource, Sampling, SmallestWorker,
+    Take, ThisProcess, Work, partition,
 };
 use nestrad_engine::frame::Frame;
 use nestrad_engine::run::Run;
@@ -17,20 +19,12 @@ use rayon::prelude::*;
 
 use crate::audits::{Audits, Said};
 use crate::blocks::SentBlock;
-use crate::cluster::{Brought, Cluster, ClusterState, Open};
-use crate::patience::Alone;
-use crate::scheduler::{BlockSpec, Id, JobSpec, SolveEnd, WorkerFacts};
+use crate::cluster::{Brought, Cluster, Open};
+use crate::patience::Patience;
+use crate::scheduler::{BlockSpec, Id, JobSpec, WorkerFacts};
 
 /// How long a thread sleeps before it looks whether it is still wanted.
-const PATIENCE: Duration = Duration::from_millis(100);
-
-impl ClusterState {
-    /// Whether anything can be computed.
-    fn check(&self) -> Result<(), ExchangeError> {
-        let failed = self.failed.clone().map(ExchangeError::Failed);
-        failed.map_or(Ok(()), Err)
-    }
-}
+const PAUSE: Duration = Duration::from_millis(100);
 
 /// The workers of a cluster as the rows of one solve. Some jobs of theirs are computed again.
 pub(crate) struct Workers<'a> {
@@ -47,28 +41,29 @@ impl<'a> Workers<'a> {
 
 impl RowSource for Workers<'_> {
     fn is_elsewhere(&self) -> bool {
-        !self.audits.have_failed()
+        !self.audits.have_failed() && !self.cluster.lock().alone
     }
 
     fn origin(&self, job: usize) -> Option<Origin> {
         self.audits.origin(job)
     }
 
-    /// Waits for the first worker, which may come at any time.
+    /// Waits for the first worker, which may come at any time. Blocks fit every worker that is large enough for the
+    /// smallest of them; where none is, and where nobody comes, it is the master that has to do.
     fn cut(&self, frame: &Frame, sampling: &Sampling, run: &Run) -> Result<Work, ExchangeError> {
         self.audits.begin();
-        if self.audits.have_failed() {
+        if !self.is_elsewhere() {
             return ThisProcess::default().cut(frame, sampling, run);
         }
         run.progress.stage("waiting for a worker", 0);
-        let worker = self.cluster.smallest_worker(run.stop)?;
+        let sizes = self.cluster.sizes(run.stop)?;
         self.cluster.0.compute.install(|| {
-            let blocks = partition(frame, sampling, worker)?;
+            let blocks = blocks(frame, sampling, &sizes)?;
             Ok(Work::split(frame, sampling, blocks))
         })
     }
 
-    /// By the workers; where none comes in time, the master computes by itself.
+    /// By the workers; the master computes what they do not bring in time.
     fn trace(
         &self,
         frame: &Frame,
@@ -77,7 +72,7 @@ impl RowSource for Workers<'_> {
         take: &mut Take<'_>,
         run: &Run,
     ) -> Result<JobCounts, ExchangeError> {
-        if self.audits.have_failed() {
+        if !self.is_elsewhere() {
             return ThisProcess::default().trace(frame, work, wanted, take, run);
         }
         let mut running = self.cluster.begin(frame, work, wanted)?;
@@ -113,34 +108,49 @@ impl RowSource for Workers<'_> {
     }
 }
 
+/// Blocks for the smallest worker for which there are any: by halves, since a cut that fails takes as long as one
+/// that does not. Without such a worker, the whole scene.
+fn blocks(
+    frame: &Frame,
+    sampling: &Sampling,
+    sizes: &[SmallestWorker],
+) -> Result<Vec<BlockOf>, ExchangeError> {
+    let (mut found, mut low, mut high) = (None, 0, sizes.len());
+    while low < high {
+        let middle = (low + high) / 2;
+        match partition(frame, sampling, sizes[middle]) {
+            Ok(blocks) => (found, high) = (Some(blocks), middle),
+            Err(ExchangeError::BlockTooLarge { .. }) => low = middle + 1,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(found.unwrap_or_else(|| vec![BlockOf::whole(frame)]))
+}
+
 impl Cluster {
-    /// The least memory for each thread decides: a block is to fit every worker there is. Where none comes
-    /// in time, it is the master that has to do.
-    fn smallest_worker(&self, stop: &Stop) -> Result<SmallestWorker, ExchangeError> {
-        let mut alone = Alone::default();
+    /// Sizes of the workers that are there, each once, those with the least memory for each thread first. None where
+    /// nobody comes in time.
+    fn sizes(&self, stop: &Stop) -> Result<Vec<SmallestWorker>, ExchangeError> {
+        let of = |facts: &WorkerFacts| SmallestWorker {
+            memory_bytes: facts.memory_bytes,
+            threads: facts.threads,
+        };
         let mut state = self.lock();
         loop {
             stop.check()?;
-            state.check()?;
-            let of = |facts: &WorkerFacts| SmallestWorker {
-                memory_bytes: facts.memory_bytes,
-                threads: facts.threads,
-            };
-            let smallest = state
-                .scheduler
-                .facts()
-                .map(of)
-                .min_by_key(|w| (w.memory_bytes / u64::from(w.threads.max(1)), w.threads));
-            if let Some(smallest) = smallest {
-                return Ok(smallest);
+            let mut sizes: Vec<SmallestWorker> = state.scheduler.facts().map(of).collect();
+            let alone = state.scheduler.deserted_for(self.now());
+            let is_over = alone.is_some_and(|time| time >= self.0.limits.patience);
+            if !sizes.is_empty() || is_over || state.deserted {
+                let least = |w: &SmallestWorker| {
+                    let each = w.memory_bytes / u64::from(w.threads.max(1));
+                    (each, w.threads, w.memory_bytes)
+                };
+                sizes.sort_unstable_by_key(least);
+                sizes.dedup();
+                return Ok(sizes);
             }
-            if alone.for_too_long(false, self.0.limits.patience) {
-                return Ok(SmallestWorker {
-                    memory_bytes: u64::MAX,
-                    threads: 1,
-                });
-            }
-            let waited = self.0.joined.wait_timeout(state, PATIENCE);
+            let waited = self.0.joined.wait_timeout(state, PAUSE);
             state = waited.unwrap_or_else(PoisonError::into_inner).0;
         }
     }
@@ -195,8 +205,10 @@ impl Cluster {
             work,
             id,
             results,
-            alone: Alone::default(),
+            patience: Patience::new(self.0.limits.patience),
             own: None,
+            computed: VecDeque::new(),
+            has_nothing: false,
         })
     }
 }
@@ -208,9 +220,13 @@ struct Running<'a> {
     work: &'a Work,
     id: Id,
     results: Receiver<Result<Brought, Arc<str>>>,
-    alone: Alone,
+    patience: Patience,
     /// The block that the master itself computes jobs of.
     own: Option<(usize, Ready)>,
+    /// What it has computed, and not handed on yet.
+    computed: VecDeque<(usize, JobRows)>,
+    /// It looked for something to compute, and found nothing.
+    has_nothing: bool,
 }
 
 /// A job, its rows, and who brought them, where it was a worker.
@@ -220,9 +236,13 @@ impl Running<'_> {
     /// The next result, whichever job it is of.
     fn next(&mut self, stop: &Stop) -> Result<Next, ExchangeError> {
         loop {
+            if let Some((job, rows)) = self.computed.pop_front() {
+                return Ok((job, rows, None));
+            }
             // who computes by itself does not sleep
-            let patience = self.own.as_ref().map_or(PATIENCE, |_| Duration::ZERO);
-            match self.results.recv_timeout(patience) {
+            let is_busy = self.patience.is_over() && !self.has_nothing;
+            let pause = if is_busy { Duration::ZERO } else { PAUSE };
+            match self.results.recv_timeout(pause) {
                 Ok(Err(worker)) => return Err(distrusted(&worker)),
                 Ok(Ok(brought)) => {
                     let Brought {
@@ -231,6 +251,7 @@ impl Running<'_> {
                         worker,
                         checksum,
                     } = brought;
+                    self.patience.is_rewarded(self.work.jobs[job].cost_s);
                     let counts = rows.counts();
                     let said = Said {
                         worker,
@@ -239,58 +260,118 @@ impl Running<'_> {
                     };
                     return Ok((job, rows, Some(said)));
                 }
-                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Timeout) => self.waited(pause),
                 Err(RecvTimeoutError::Disconnected) => {
                     return Err(ExchangeError::Failed("the workers are gone".to_owned()));
                 }
             }
             stop.check()?;
-            let state = self.cluster.lock();
-            state.check()?;
-            let end = state.scheduler.end_of(self.id);
-            if let Some(SolveEnd::Failed(reason)) = end {
-                return Err(ExchangeError::Failed(reason));
-            }
-            let anybody = state.scheduler.has_worker_for(self.id);
-            drop(state);
-            let limit = self.cluster.0.limits.patience;
-            if self.alone.for_too_long(anybody, limit) {
-                if let Some((job, rows)) = self.compute_one()? {
-                    return Ok((job, rows, None));
-                }
+            self.has_nothing = true;
+            if let Some((job, reason)) = self.failing() {
+                self.compute(&[job], Some(&reason))?;
+            } else if self.is_alone() {
+                let most = self.cluster.0.compute.current_num_threads();
+                let now = self.cluster.now();
+                let jobs = {
+                    let state = self.cluster.lock();
+                    state.scheduler.for_the_master(now, self.id, most)
+                };
+                self.compute(&jobs, None)?;
             } else {
                 self.own = None;
             }
         }
     }
 
-    /// Computes a job that waits; nothing where there is none, or where another was faster.
-    fn compute_one(&mut self) -> Result<Option<(usize, JobRows)>, ExchangeError> {
-        let Some((job, number)) = self.cluster.lock().scheduler.waiting(self.id) else {
-            return Ok(None);
-        };
-        let rows = self.compute(job, number)?;
-        let first = self.cluster.lock().scheduler.known(self.id, job);
-        Ok(first.then_some((job, rows)))
+    fn waited(&mut self, pause: Duration) {
+        let was_over = self.patience.is_over();
+        self.patience.waited(pause);
+        if self.patience.is_over() && !was_over && self.cluster.has_workers() {
+            let limit_s = self.cluster.0.limits.patience.as_secs_f64();
+            let remark = format!(
+                "workers brought next to nothing for {limit_s} s: the master computes too, until they bring more"
+            );
+            self.cluster.lock().remark(remark);
+        }
     }
 
-    /// The rows of a job of a block, computed by the master.
-    fn compute(&mut self, job: usize, number: usize) -> Result<JobRows, ExchangeError> {
+    /// A job that workers fail, and why.
+    fn failing(&self) -> Option<(usize, String)> {
+        let mut state = self.cluster.lock();
+        let (job, reason) = state.scheduler.failing(self.id)?;
+        let reason = reason.to_owned();
+        state.remark(format!(
+            "a near-field job failed on {reason}: the master computes it"
+        ));
+        Some((job, reason))
+    }
+
+    /// Whether the master is to compute by itself: nobody has been there for long, nobody who is there is large
+    /// enough, or nothing comes of them.
+    fn is_alone(&mut self) -> bool {
+        let state = self.cluster.lock();
+        if !state.scheduler.has_worker_for(self.id) {
+            let alone = state.scheduler.deserted_for(self.cluster.now());
+            let waits = alone.is_some_and(|time| time < self.cluster.0.limits.patience);
+            if !waits || state.deserted {
+                self.patience.ends();
+            }
+        }
+        self.patience.is_over()
+    }
+
+    /// Computes jobs of one block, all at once; `reason` is why workers failed to. A panic is a fault of the kernel
+    /// with that job.
+    fn compute(&mut self, jobs: &[usize], reason: Option<&str>) -> Result<(), ExchangeError> {
+        let rows = self.rows(jobs, reason)?;
+        let mut state = self.cluster.lock();
+        for (&job, rows) in jobs.iter().zip(rows) {
+            // another may have been faster
+            if state.scheduler.known(self.id, job) {
+                self.computed.push_back((job, rows));
+            }
+        }
+        self.has_nothing = false;
+        Ok(())
+    }
+
+    /// The rows of jobs of one block.
+    fn rows(
+        &mut self,
+        jobs: &[usize],
+        reason: Option<&str>,
+    ) -> Result<Vec<JobRows>, ExchangeError> {
+        let Some(&first) = jobs.first() else {
+            return Ok(Vec::new());
+        };
+        let number = self.work.jobs[first].block;
         let own = match self.own.take().filter(|(of, _)| *of == number) {
             Some((_, ready)) => ready,
             None => Ready::of(&self.work.blocks[number], self.frame)?,
         };
-        let rows = self.cluster.0.compute.install(|| own.rows(self.work, job));
+        let work = self.work;
+        let rows = |&job: &usize| {
+            let rows = catch_unwind(AssertUnwindSafe(|| own.rows(work, job)));
+            rows.map_err(|_| {
+                let before = reason.map(|reason| format!("on {reason}; and "));
+                let before = before.unwrap_or_default();
+                let text = format!("near-field job {job} failed {before}in the master");
+                ExchangeError::Failed(text)
+            })
+        };
+        let all: Result<Vec<JobRows>, ExchangeError> =
+            (self.cluster.0.compute).install(|| jobs.par_iter().map(rows).collect());
         self.own = Some((number, own));
-        Ok(rows)
+        all
     }
 
     /// Computes a job again; a worker that brought other rows is refused from now on.
     fn audit(&mut self, audits: &Audits, job: usize) -> Result<(), ExchangeError> {
-        let rows = self.compute(job, self.work.jobs[job].block)?;
+        let rows = self.rows(&[job], None)?;
         let totals = &self.cluster.0.totals;
         totals.audited.fetch_add(1, Ordering::Relaxed);
-        let Some(worker) = audits.compare(job, &rows) else {
+        let wrong = rows.first().and_then(|rows| audits.compare(job, rows));
+        let Some(worker) = wrong else {
             return Ok(());
         };
         self.cluster.refuse(&worker);

@@ -24,6 +24,7 @@ pub mod lit_canopy;
 mod outer_soil;
 pub mod plan;
 pub mod progress;
+pub mod resident;
 pub mod rounds;
 pub mod run;
 mod sinks;

@@ -1,11 +1,27 @@
 //! Why a solve fails.
 
+use std::any::Any;
+
 use nestrad_kernel::BlockFault;
 use thiserror::Error;
 
 use crate::exchange::ExchangeError;
+use crate::plan::PlanError;
 use crate::solver::SolverError;
 use crate::stop::Stopped;
+
+/// What kind of thing keeps a solve from its results: callers act by it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum FailureKind {
+    /// The scene or an option cannot be.
+    Input,
+    /// A limit that was set does not allow it.
+    Limit,
+    /// It was computed, and went wrong.
+    Fault,
+    /// It is not wanted any more.
+    Cancelled,
+}
 
 /// Why there is no solution.
 #[derive(Debug, Error)]
@@ -33,6 +49,9 @@ pub enum SolveError {
         /// Its standard error.
         stated: f64,
     },
+    /// The program panicked.
+    #[error("internal fault: {0}")]
+    Panic(String),
     /// It is not wanted any more.
     #[error(transparent)]
     Stopped(#[from] Stopped),
@@ -59,6 +78,44 @@ impl From<SolverError> for SolveError {
         match error {
             SolverError::Stopped(stopped) => Self::Stopped(stopped),
             error => Self::Solver(error),
+        }
+    }
+}
+
+impl SolveError {
+    /// What a panic said, as an error.
+    pub(crate) fn of_panic(panic: &(dyn Any + Send)) -> Self {
+        let text = panic.downcast_ref::<&str>().copied();
+        let text = text.or_else(|| panic.downcast_ref::<String>().map(String::as_str));
+        Self::Panic(text.unwrap_or("the program panicked").to_owned())
+    }
+
+    /// Its kind.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::Stopped(_) => FailureKind::Cancelled,
+            Self::Exchange(ExchangeError::BlockTooLarge { .. }) => FailureKind::Limit,
+            Self::Block(_)
+            | Self::Exchange(_)
+            | Self::Solver(_)
+            | Self::Unbalanced { .. }
+            | Self::Panic(_) => FailureKind::Fault,
+        }
+    }
+}
+
+impl PlanError {
+    /// Its kind.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::Memory { .. }
+            | Self::Elements { .. }
+            | Self::Time { .. }
+            | Self::Overtime { .. } => FailureKind::Limit,
+            Self::Accuracy { .. }
+            | Self::Overhang { .. }
+            | Self::Narrow { .. }
+            | Self::Height { .. } => FailureKind::Input,
         }
     }
 }

@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::account::Accounting;
 use crate::assemble::Parts;
-use crate::direct::{Direct, direct_light};
+use crate::direct::{Direct, KeptDirections, direct_light_keeping};
 use crate::exchange::{
     Exchange, ExchangeError, FarRows, JobCounts, Outlook, RowSource, ThisProcess,
 };
@@ -29,7 +29,7 @@ use crate::plan::{LightPlan, Plan, TracePlan};
 use crate::progress::Progress;
 use crate::run::Run;
 use crate::solution::Solution;
-pub use crate::solve_error::SolveError;
+pub use crate::solve_error::{FailureKind, SolveError};
 use crate::solver::{FarSample, Groups, Irradiance, Sampled, System, solve as solve_system};
 use crate::stopwatch::Stopwatch;
 
@@ -37,6 +37,8 @@ use crate::stopwatch::Stopwatch;
 pub struct TracedCanopy {
     frame: Frame,
     scattering: Option<Scattering>,
+    /// What directions lighted it so far.
+    directions: KeptDirections,
 }
 
 /// What light that is scattered goes by; not there where nothing was to be scattered.
@@ -120,7 +122,7 @@ impl TracedCanopy {
             Some(sampling) => Ok(Some(Exchange::trace(&frame, sampling, rows, run)?)),
             None => Ok(None),
         };
-        let is_elsewhere = rows.is_elsewhere() && plan.sampling.is_some();
+        let is_elsewhere = rows.is_elsewhere() && plan.sampling.is_some() && !plan.in_turn;
         let ((done, far), exchange) = if is_elsewhere {
             at_once(run, |run| here(run, watch), there)?
         } else {
@@ -136,7 +138,24 @@ impl TracedCanopy {
             far,
         });
         watch.lap("exchange");
-        Ok((Self { frame, scattering }, done))
+        let traced = Self {
+            frame,
+            scattering,
+            directions: KeptDirections::default(),
+        };
+        Ok((traced, done))
+    }
+
+    /// The same with what directions light it by.
+    pub(crate) fn keeping(mut self, directions: KeptDirections) -> Self {
+        self.directions = directions;
+        self
+    }
+
+    /// Bytes that it takes, with the directions that are kept.
+    pub fn bytes(&self) -> u64 {
+        let scattering = self.scattering.as_ref().map_or(0, Scattering::bytes);
+        self.frame.bytes() + scattering + self.directions.bytes()
     }
 
     /// The canopy in its frame.
@@ -157,9 +176,20 @@ impl TracedCanopy {
         plan: &LightPlan,
         run: &Run,
     ) -> Result<(Solution, WorkDone), SolveError> {
+        self.lit_watched(optics, sources, plan, run, &mut Stopwatch::start())
+    }
+
+    /// The same, watched.
+    pub(crate) fn lit_watched(
+        &self,
+        optics: &Optics,
+        sources: &Sources,
+        plan: &LightPlan,
+        run: &Run,
+        watch: &mut Stopwatch,
+    ) -> Result<(Solution, WorkDone), SolveError> {
         let light = FramedLight::of(&self.frame, optics, sources, plan);
-        let watch = &mut Stopwatch::start();
-        let direct = light.direct(&self.frame, run, watch)?;
+        let direct = light.direct(&self.frame, &self.directions, run, watch)?;
         self.solve(&light, &direct, run, watch)
     }
 
@@ -254,6 +284,7 @@ impl<'a> FramedLight<'a> {
     fn direct(
         &self,
         frame: &Frame,
+        kept: &KeptDirections,
         run: &Run,
         watch: &mut Stopwatch,
     ) -> Result<Direct, SolveError> {
@@ -262,10 +293,12 @@ impl<'a> FramedLight<'a> {
             .stage("direct light", sources.list.len() as u64);
         let line_areas_m2 = self.plan.line_areas_m2(&frame.world.extent, sources);
         let projections = (sources, &line_areas_m2[..]);
-        let direct = direct_light(frame, &self.optics, projections, self.plan.seed, || {
+        let step = || {
             run.progress.inc(1);
             run.stop.check()
-        })?;
+        };
+        let seed = self.plan.seed;
+        let direct = direct_light_keeping(frame, &self.optics, projections, seed, kept, step)?;
         watch.lap("direct light");
         Ok(direct)
     }
@@ -280,14 +313,30 @@ pub fn solve(
     run: &Run,
     watch: &mut Stopwatch,
 ) -> Result<(Solution, WorkDone), SolveError> {
+    let directions = KeptDirections::default();
+    let (solution, work, _) = solve_and_keep(lit, plan, (rows, run, watch), directions)?;
+    Ok((solution, work))
+}
+
+/// The same; the canopy stays, with the directions that there is room for.
+pub(crate) fn solve_and_keep(
+    lit: &LitCanopy,
+    plan: &Plan,
+    (rows, run, watch): (&dyn RowSource, &Run, &mut Stopwatch),
+    directions: KeptDirections,
+) -> Result<(Solution, WorkDone, TracedCanopy), SolveError> {
     let frame = Frame::new(lit.canopy, &plan.trace.cut())?;
     watch.lap("elements");
     run.stop.check()?;
     let light = FramedLight::of(&frame, lit.optics, lit.sources, &plan.light);
-    let direct = |frame: &Frame, run: &Run, watch: &mut Stopwatch| light.direct(frame, run, watch);
+    let direct = |frame: &Frame, run: &Run, watch: &mut Stopwatch| {
+        light.direct(frame, &directions, run, watch)
+    };
     let means = (rows, run, &mut *watch);
     let (traced, direct) = TracedCanopy::of_frame(frame, &plan.trace, means, direct)?;
-    traced.solve(&light, &direct, run, watch)
+    let traced = traced.keeping(directions);
+    let (solution, work) = traced.solve(&light, &direct, run, watch)?;
+    Ok((solution, work, traced))
 }
 
 /// Does one thing here and another on a thread of its own, which is not counted. Where one fails, the other is
@@ -320,6 +369,19 @@ fn at_once<A, B: Send>(
     match (here, there) {
         (Ok(here), Ok(there)) => Ok((here, there)),
         (Err(SolveError::Stopped(_)), Err(error)) | (Err(error), _) | (_, Err(error)) => Err(error),
+    }
+}
+
+impl Scattering {
+    fn bytes(&self) -> u64 {
+        let looks = self
+            .far
+            .iter()
+            .flat_map(|far| [&far.within, &far.without_end]);
+        let looks = looks.map(|look| look.exchange.bytes() + look.outlook.bytes());
+        let far = self.far.as_ref().map_or(0, |far| far.rows.bytes());
+        let own = self.exchange.bytes() + self.outlook.bytes() + self.groups.bytes();
+        own + far + looks.sum::<u64>()
     }
 }
 

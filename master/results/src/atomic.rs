@@ -20,11 +20,12 @@ use tempfile::TempDir;
 
 use crate::error::{Fault, OutputError};
 
-/// Refuses a folder that results could not be written into. It is not made, and nothing in it changes:
-/// this is for the beginning of a long computation, which may still fail.
-pub fn check_writable(folder: &Path) -> Result<(), OutputError> {
-    // "" is the parent of a relative name
-    let there = |at: &&Path| at.as_os_str().is_empty() || at.exists();
+/// Refuses a folder that files of these names could not be written into: it cannot be made or written, or something
+/// stands in the way. It is not made, and nothing in it changes: this is for the beginning of a long computation, which
+/// may still fail.
+pub fn check_writable(folder: &Path, names: &[&str]) -> Result<(), OutputError> {
+    // "" is the parent of a relative name; a link that leads nowhere is there too
+    let there = |at: &&Path| at.as_os_str().is_empty() || at.symlink_metadata().is_ok();
     let nearest = folder.ancestors().find(there).unwrap_or(folder);
     let nearest = if nearest.as_os_str().is_empty() {
         Path::new(".")
@@ -33,7 +34,20 @@ pub fn check_writable(folder: &Path) -> Result<(), OutputError> {
     };
     tempfile::tempfile_in(nearest)
         .map(drop)
-        .map_err(|error| OutputError::at(folder, error))
+        .map_err(|error| OutputError::at(folder, error))?;
+    no_folders(folder, names.iter().copied())
+}
+
+/// Refuses folders where files are to be.
+fn no_folders<'a>(
+    folder: &Path,
+    names: impl IntoIterator<Item = &'a str>,
+) -> Result<(), OutputError> {
+    let mut places = names.into_iter().map(|name| folder.join(name));
+    match places.find(|place| place.is_dir()) {
+        Some(place) => Err(OutputError::at(&place, Fault::IsFolder)),
+        None => Ok(()),
+    }
 }
 
 /// A folder that is about to be given new files.
@@ -86,12 +100,7 @@ impl Staging {
     /// not among them (what an earlier run wrote and this one did not).
     pub fn commit(mut self, seal: &str, stale: &[&str]) -> Result<(), OutputError> {
         let own = self.names.iter().map(String::as_str);
-        for name in own.chain(stale.iter().copied()) {
-            let place = self.folder.join(name);
-            if place.is_dir() {
-                return Err(OutputError::at(&place, Fault::IsFolder));
-            }
-        }
+        no_folders(&self.folder, own.chain(stale.iter().copied()))?;
         self.remove(seal)?;
         for name in stale
             .iter()
@@ -222,6 +231,8 @@ mod tests {
         let folder = with_old_result();
         fs::create_dir(folder.path().join("b.csv")).expect("made");
         let before = listing(folder.path());
+        let early = check_writable(folder.path(), &["a.csv", "b.csv"]).expect_err("in the way");
+        assert!(early.to_string().ends_with("b.csv"), "{early}");
         let mut staging = Staging::begin(folder.path()).expect("begun");
         put(&mut staging, "a.csv", "new a");
         put(&mut staging, "b.csv", "new b");
@@ -248,17 +259,27 @@ mod tests {
     fn a_folder_is_checked_without_a_trace() {
         let folder = with_old_result();
         let before = listing(folder.path());
-        assert!(check_writable(folder.path()).is_ok());
-        assert!(check_writable(&folder.path().join("new").join("out")).is_ok());
-        assert!(check_writable(Path::new("no such folder")).is_ok());
+        assert!(check_writable(folder.path(), &["a.csv", "b.csv"]).is_ok());
+        assert!(check_writable(&folder.path().join("new").join("out"), &["a.csv"]).is_ok());
+        assert!(check_writable(Path::new("no such folder"), &["a.csv"]).is_ok());
         assert_eq!(listing(folder.path()), before);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_that_leads_nowhere_is_seen_before_the_work() {
+        let folder = with_old_result();
+        let link = folder.path().join("out");
+        std::os::unix::fs::symlink("no/such/place", &link).expect("linked");
+        assert!(check_writable(&link, &[]).is_err());
+        assert!(check_writable(&link.join("more"), &[]).is_err());
     }
 
     #[test]
     fn an_impossible_folder_is_named() {
         let folder = with_old_result();
         let path = folder.path().join("my").join("out");
-        let early = check_writable(&path).expect_err("a file is in the way");
+        let early = check_writable(&path, &[]).expect_err("a file is in the way");
         assert_eq!(
             early.to_string(),
             format!("cannot write {}", path.display())

@@ -33,6 +33,5 @@ mod vtp;
 
 pub use nestrad_common::options::TableFormat;
 
-pub use atomic::check_writable;
 pub use error::{Fault, OutputError};
-pub use folder::{Formats, StagedResult, stage, write_all};
+pub use folder::{Formats, StagedResult, check_place, stage, write_all};

@@ -7,6 +7,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use nestrad_common::printable;
 use nestrad_engine::progress::{Progress, StageProgress};
 
 /// A stage that is done sooner than this gets no bar.
@@ -32,7 +33,7 @@ impl Bar {
         }
         let progress = progress.clone();
         let (end, ended) = mpsc::channel();
-        let drawing = thread::spawn(move || {
+        let drawing = thread::Builder::new().spawn(move || {
             let mut shown = None;
             while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(PAUSE) {
                 shown = redrawn(shown, &progress);
@@ -41,7 +42,8 @@ impl Bar {
         });
         Self {
             end: Some(end),
-            drawing: Some(drawing),
+            // without a thread there is no bar
+            drawing: drawing.ok(),
         }
     }
 }
@@ -96,7 +98,7 @@ fn new_bar(stage: &StageProgress, waited: Duration) -> ProgressBar {
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::with_draw_target(Some(stage.total), ProgressDrawTarget::stderr())
         .with_style(style)
-        .with_message(stage.name.clone())
+        .with_message(printable::line(&stage.name).into_owned())
         .with_elapsed(waited)
 }
 

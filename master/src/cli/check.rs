@@ -2,21 +2,27 @@
 
 use anyhow::Result;
 use clap::Args;
+use glam::DVec3;
 use nestrad_common::assemble::{Examined, examine};
 use nestrad_common::canopy::Canopy;
 use nestrad_common::figures::fixed;
 use nestrad_common::inspection::{Inspection, MaterialFacts, SunFacts};
-use nestrad_common::light::Light;
-use nestrad_common::optics::{FaceOptics, Optics};
+use nestrad_common::light::{Light, Source};
+use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
 use nestrad_common::options::Options;
+use nestrad_common::printable;
+use nestrad_common::scene::Scene;
+use nestrad_engine::plan::Estimator;
+use nestrad_engine::rounds::first_plan;
 
 use super::console::{self, Notes};
 use super::flags::SceneFlags;
+use super::settings::settings;
 
 /// Show what is in a scene and what is wrong with it; compute nothing
 ///
 /// Geometry is required; optics and light are checked if they are given. Facts and warnings go to stdout. The
-/// exit code is 1 if `solve` would refuse what is given.
+/// exit code is 1 if `solve` would refuse what is given, with the options of the scene file.
 #[derive(Debug, Args)]
 pub(crate) struct CheckArgs {
     #[command(flatten)]
@@ -31,7 +37,7 @@ impl CheckArgs {
             optics,
             light,
             light_bands,
-            mut faults,
+            faults,
         } = examine(&inputs);
         let mut facts = Facts::default();
         if let Some((_, inspection)) = &canopy {
@@ -51,14 +57,57 @@ impl CheckArgs {
             facts.warnings(inspection);
             console::print(facts.0.as_bytes())?;
         }
-        let Some(last) = faults.pop() else {
+        let mut errors: Vec<anyhow::Error> = faults.into_iter().map(Into::into).collect();
+        if errors.is_empty()
+            && let Some((canopy, _)) = canopy
+        {
+            let settings = settings(&inputs.options, None, Estimator::default());
+            let scene = complete(canopy, optics, light);
+            errors.extend(first_plan(&scene, &settings).err().map(Into::into));
+        }
+        let Some(last) = errors.pop() else {
             return Ok(());
         };
-        for fault in faults {
-            Notes { quiet: false }.say("error", &fault.to_string());
+        for error in errors {
+            Notes { quiet: false }.say("error", &error.to_string());
         }
-        Err(last.into())
+        Err(last)
     }
+}
+
+/// A scene to plan a solve of. Where optics or light are not given yet, there are the simplest: a black band, and light
+/// from the zenith.
+fn complete(canopy: Canopy, optics: Option<Optics>, light: Option<Light>) -> Scene {
+    let optics = optics.unwrap_or_else(|| {
+        let count = light.as_ref().map_or(1, bands_of);
+        let black = |number: usize| Band {
+            name: number.to_string(),
+            soil_albedo: 0.0,
+            materials: vec![LeafOptics::default(); canopy.materials.len()],
+        };
+        Optics {
+            bands: (0..count).map(black).collect(),
+        }
+    });
+    let light = light.unwrap_or_else(|| Light {
+        suns: vec![Source {
+            direction: DVec3::NEG_Z,
+            irradiance_W_m2: vec![1.0; optics.len()],
+        }],
+        sky: None,
+    });
+    Scene {
+        canopy: canopy.into(),
+        optics: optics.into(),
+        light: light.into(),
+    }
+}
+
+/// How many bands a light is given for.
+fn bands_of(light: &Light) -> usize {
+    let suns = light.suns.first().map(|sun| sun.irradiance_W_m2.len());
+    let sky = light.sky.as_ref().map(|sky| sky.irradiance_W_m2.len());
+    suns.or(sky).unwrap_or(1)
 }
 
 /// Lines of text: a word, and what is to be said of it.
@@ -67,6 +116,7 @@ struct Facts(String);
 
 impl Facts {
     fn line(&mut self, what: &str, text: &str) {
+        let text = printable::line(text);
         self.0.push_str(&format!("{what:<10}{text}\n"));
     }
 

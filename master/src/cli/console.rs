@@ -1,17 +1,16 @@
 //! What is said to the user: results on stdout, notes and errors on stderr.
 
 use std::io::{self, ErrorKind, Write};
-use std::process::ExitCode;
 
 use anyhow::{Context, Result};
-
-/// Input that cannot be used, or a solve that failed.
-const FAILURE: u8 = 1;
+use nestrad_common::printable;
 
 /// Writes to stdout. A reader that has seen enough (`nestrad check ... | head`) is no error.
 pub(crate) fn print(text: &[u8]) -> Result<()> {
+    let text = String::from_utf8_lossy(text);
     let mut out = io::stdout().lock();
-    match out.write_all(text).and_then(|()| out.flush()) {
+    let written = out.write_all(printable::lines(&text).as_bytes());
+    match written.and_then(|()| out.flush()) {
         Err(error) if error.kind() != ErrorKind::BrokenPipe => {
             Err(error).context("cannot write to stdout")
         }
@@ -26,6 +25,13 @@ pub(crate) struct Notes {
 }
 
 impl Notes {
+    /// Shows a table of results that are written already: a stdout that takes nothing does not undo them.
+    pub(crate) fn show(self, table: &[u8]) {
+        if let Err(error) = print(table) {
+            self.say("warning", &format!("{error:#}: the table is not shown"));
+        }
+    }
+
     pub(crate) fn say(self, what: &str, line: &str) {
         if !self.quiet {
             note(what, line);
@@ -33,28 +39,15 @@ impl Notes {
     }
 }
 
-/// The exit code of a command, whose error is reported: 0, 1 where it failed, 2 where it was called
-/// in a way that makes no sense.
-pub(crate) fn exit_code(outcome: Result<()>) -> ExitCode {
-    let Err(error) = outcome else {
-        return ExitCode::SUCCESS;
-    };
-    if let Some(usage) = error.downcast_ref::<clap::Error>() {
-        // nothing can be done about a stderr that is gone
-        let _ = usage.print();
-        return u8::try_from(usage.exit_code()).unwrap_or(FAILURE).into();
-    }
-    note("error", &chain(&error));
-    FAILURE.into()
-}
-
-fn note(what: &str, line: &str) {
+/// A remark or an error. Whatever comes from a file or a peer is cleaned here.
+pub(super) fn note(what: &str, text: &str) {
+    let text = printable::line(text);
     // nothing can be done about a stderr that is gone
-    let _ = writeln!(io::stderr().lock(), "{what}: {line}");
+    let _ = writeln!(io::stderr().lock(), "{what}: {text}");
 }
 
 /// An error and its causes in one line. Where a message says what its cause says too, it is said once.
-fn chain(error: &anyhow::Error) -> String {
+pub(super) fn chain(error: &anyhow::Error) -> String {
     let mut text = String::new();
     for cause in error.chain() {
         let cause = cause.to_string();

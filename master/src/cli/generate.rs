@@ -10,7 +10,7 @@ use nestrad_common::generate::{
     Bean, Generated, LeafAngles, LeafShape, Maize, Overwrite, RandomCanopy, Stand,
 };
 
-use super::console;
+use super::console::Notes;
 use super::numbers::{number, whole};
 
 /// Write a made-up canopy, with optics, light and a scene file, for `nestrad solve DIR/scene.toml`
@@ -189,7 +189,8 @@ fn write(canopy: &Generated, place: &Place, name: &str) -> Result<()> {
         scene = folder.join("scene.toml").display(),
         out = folder.join("out").display(),
     );
-    console::print(text.as_bytes())
+    Notes { quiet: false }.show(text.as_bytes());
+    Ok(())
 }
 
 /// Two numbers as one word: `4x2`.

@@ -3,6 +3,7 @@
 mod bar;
 mod check;
 mod console;
+mod exit;
 mod flags;
 mod generate;
 mod numbers;
@@ -10,6 +11,7 @@ mod record;
 mod remote;
 mod report;
 mod serve;
+mod settings;
 mod solve;
 mod state;
 mod status;
@@ -18,7 +20,7 @@ mod workers;
 
 use clap::{Parser, Subcommand};
 
-pub(crate) use console::exit_code;
+pub(crate) use exit::code_of;
 
 /// Computes how much light every leaf of a plant canopy absorbs.
 ///

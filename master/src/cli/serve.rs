@@ -6,11 +6,13 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 use clap::Args;
 use nestrad_cluster::WorkerLimits;
+use nestrad_common::threads::Threads;
 use nestrad_proto::access::Access;
-use nestrad_service::server::{Service, ServiceLimits, serve_metrics};
+use nestrad_proto::connections::{ConnectionLimits, Connections};
+use nestrad_proto::log::Log;
+use nestrad_service::server::{Service, ServiceLimits};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
-use tracing_subscriber::EnvFilter;
 
 use super::numbers::{positive, whole};
 use super::state::StateFlags;
@@ -34,7 +36,7 @@ pub(crate) struct ServeArgs {
     #[arg(long, value_name = "SECONDS", default_value = "30", value_parser = lease)]
     lease: Duration,
 
-    /// After this many seconds without any worker, the master computes by itself
+    /// After this many seconds without results from workers, the master computes by itself
     #[arg(long, value_name = "SECONDS", default_value = "60", value_parser = lease)]
     patience: Duration,
 
@@ -57,15 +59,15 @@ pub(crate) struct ServeArgs {
 #[derive(Args, Clone, Copy, Debug)]
 #[command(next_help_heading = "Limits")]
 struct LimitFlags {
-    /// Number of threads, 0 for one per processor
-    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u16>(0..=65_535), allow_negative_numbers = true)]
+    /// Number of threads, 0 for one per processor; at most 4 for each processor are used
+    #[arg(long, value_name = "N", default_value_t = 0, value_parser = whole::<u16>(0..=4096), allow_negative_numbers = true)]
     threads: u16,
 
     /// Solves that are computed at the same time
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = whole::<u8>(1..=255), allow_negative_numbers = true)]
     solves: u8,
 
-    /// Solves that may wait
+    /// Solves that may wait; of one client, half of what the others leave
     #[arg(long, value_name = "N", default_value_t = 1000, value_parser = whole::<u32>(0..=u32::MAX.into()), allow_negative_numbers = true)]
     queue: u32,
 
@@ -73,11 +75,12 @@ struct LimitFlags {
     #[arg(long, value_name = "GIB", default_value_t = 8.0, value_parser = positive)]
     memory: f64,
 
-    /// Memory for scenes that are held, GiB; where it is full, the scene that was unused for longest is dropped
+    /// Memory for scenes that are held, GiB; where it is full, the client with the most loses the scene that it did not
+    /// use for longest
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     scene_memory: f64,
 
-    /// Memory for results that are held, GiB; where it is full, the oldest are dropped
+    /// Memory for results that are held, GiB; where it is full, new solves are refused until results were fetched
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     result_memory: f64,
 
@@ -102,23 +105,7 @@ impl LimitFlags {
 
 impl ServeArgs {
     pub(crate) fn run(self) -> Result<()> {
-        let mut filter =
-            EnvFilter::try_from_env("NESTRAD_LOG").unwrap_or_else(|_| EnvFilter::new("info"));
-        // libraries that would write headers, and with them tokens, into the log
-        for quiet in [
-            "h2=info",
-            "hyper=info",
-            "rustls=info",
-            "tonic=info",
-            "tower=info",
-        ] {
-            filter = filter.add_directive(quiet.parse()?);
-        }
-        tracing_subscriber::fmt()
-            .with_env_filter(filter)
-            .with_writer(std::io::stderr)
-            .with_ansi(false)
-            .init();
+        let _log = Log::begin("NESTRAD_LOG")?;
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
             .enable_all()
@@ -142,17 +129,28 @@ impl ServeArgs {
             audit: self.audit,
             ..WorkerLimits::default().with_lease(self.lease)
         };
-        let kept = self.state.open()?;
-        let threads = self.limits.threads.into();
-        let service = Service::new(self.limits.limits(), workers, kept, threads)?;
+        // before anything is begun that would have to wait
+        let connections = Connections::new(ConnectionLimits::default().within_open_files());
+        let server = self.access.server(self.listen, &connections)?;
+        let kept = self.state.open(|warning| tracing::warn!("{warning}"))?;
+        let threads = Threads::asked(self.limits.threads.into());
+        if let Some(warning) = &threads.warning {
+            tracing::warn!("{warning}");
+        }
+        let service = Service::new(
+            self.limits.limits(),
+            workers,
+            kept,
+            threads.count,
+            connections,
+        )?;
         let listener = bind(self.listen).await?;
         if let Some(address) = self.metrics {
             let listener = bind(address).await?;
             tracing::info!(address = %listener.local_addr()?, "metrics");
-            tokio::spawn(serve_metrics(listener, service.clone()));
+            service.serve_metrics(listener);
         }
-        tracing::info!(address = %listener.local_addr()?, "serves");
-        service.run(listener, &self.access, shutdown).await?;
+        service.run(listener, server, shutdown).await?;
         tracing::info!("stopped");
         Ok(())
     }

@@ -11,25 +11,28 @@ use nestrad_common::inputs::Inputs;
 use nestrad_common::inspection::Inspection;
 use nestrad_common::options::{Diameter, Options, TableFormat};
 use nestrad_common::scene::Scene;
+use nestrad_common::threads::Threads;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::plan::{Estimator, Plan, Settings};
 use nestrad_engine::progress::Progress;
-use nestrad_engine::rounds::{Accuracy, Round, solve_in_rounds};
+use nestrad_engine::rounds::{Accuracy, Ended, Round, solve_in_rounds};
 use nestrad_engine::run::Run;
 use nestrad_engine::stop::Stop;
 use nestrad_engine::stopwatch::{Stage, Stopwatch, Usage};
 use nestrad_results::summary::Summary;
-use nestrad_results::{Formats, check_writable, stage, terminal};
+use nestrad_results::{Formats, check_place, stage, terminal};
 use nestrad_service::client::SolvedThere;
 use rayon::ThreadPoolBuilder;
 use serde::Deserialize;
 
 use super::bar::Bar;
-use super::console::{self, Notes};
+use super::console::Notes;
+use super::exit::MissedTarget;
 use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
 use super::record::OptionsRecord;
 use super::remote::MasterFlags;
+use super::settings::settings;
 use super::state::StateFlags;
 use super::workers::{Crew, WorkersFlags};
 
@@ -37,6 +40,10 @@ use super::workers::{Crew, WorkersFlags};
 ///
 /// Writes organs.csv, triangles.csv, soil.csv (where there is a soil plane) and summary.json into DIR; after an
 /// error DIR is unchanged. The plan goes to stderr, a table of the energy balance to stdout.
+///
+/// Exit codes: 0 success; 1 input that cannot be used; 2 wrong flags; 3 results were written, but a fault kept them
+/// from the asked accuracy; 4 a limit (memory, time, size, queue) does not allow it; 5 the master cannot be reached,
+/// went away, or refuses the caller; 6 an inner fault; 130 cancelled.
 #[derive(Debug, Args)]
 pub(crate) struct SolveArgs {
     #[command(flatten)]
@@ -80,15 +87,19 @@ struct HowFlags {
     /// Longest time of the solve, seconds: it stops with the smallest error that it can reach in that time, and
     /// says which
     ///
-    /// Results then depend on how fast the machine is.
+    /// A solve that even its coarsest plan cannot do in that time is refused before it starts. Reading and writing
+    /// files comes besides. Results then depend on how fast the machine is.
     #[arg(long, value_name = "SECONDS", value_parser = positive, allow_negative_numbers = true)]
     budget: Option<f64>,
 
-    /// Memory that the solve may take, GiB [default: 8]
+    /// Memory that the solve may take, GiB, with its local workers [default: 8]
+    ///
+    /// Where it is short, the finest plan that fits is carried out, and the plan says what is coarser. A solve that
+    /// even its coarsest plan does not fit is refused.
     #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
     memory: Option<f64>,
 
-    /// Number of threads, 0 for one per processor; results do not depend on it [default: 0]
+    /// Number of threads, 0 for one per processor, at most 4 for each; results do not depend on it [default: 0]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=4096), allow_negative_numbers = true)]
     threads: Option<usize>,
 
@@ -129,6 +140,15 @@ enum EstimatorFlag {
     Rays,
 }
 
+impl From<EstimatorFlag> for Estimator {
+    fn from(flag: EstimatorFlag) -> Self {
+        match flag {
+            EstimatorFlag::Lines => Self::Lines,
+            EstimatorFlag::Rays => Self::Rays,
+        }
+    }
+}
+
 impl SolveArgs {
     fn options(&self) -> Options {
         let Self { how, results, .. } = self;
@@ -147,7 +167,7 @@ impl SolveArgs {
         let options = self.options();
         let inputs = self.scene.inputs(options)?;
         let task = Task {
-            settings: settings(&inputs.options, &self.how),
+            settings: settings(&inputs.options, self.how.budget, self.how.estimator.into()),
             notes: Notes {
                 quiet: self.results.quiet,
             },
@@ -157,26 +177,13 @@ impl SolveArgs {
             out: self.results.out,
             place: self.place,
         };
-        let threads = task.inputs.options.threads.unwrap_or(0);
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        let threads = Threads::asked(task.inputs.options.threads.unwrap_or(0));
+        if let Some(warning) = &threads.warning {
+            task.notes.say("warning", warning);
+        }
+        let pool = ThreadPoolBuilder::new().num_threads(threads.count).build();
         pool.context("cannot start threads")?
             .install(|| task.solve())
-    }
-}
-
-fn settings(options: &Options, how: &HowFlags) -> Settings {
-    let default = Settings::default();
-    Settings {
-        diameter: options.diameter.unwrap_or(default.diameter),
-        accuracy_percent: options.accuracy_percent.unwrap_or(default.accuracy_percent),
-        in_rounds: options.accuracy_percent.or(how.budget).is_some(),
-        budget_s: how.budget,
-        memory_GiB: options.memory_GiB.unwrap_or(default.memory_GiB),
-        seed: options.seed.unwrap_or(default.seed),
-        estimator: match how.estimator {
-            EstimatorFlag::Lines => Estimator::Lines,
-            EstimatorFlag::Rays => Estimator::Rays,
-        },
     }
 }
 
@@ -194,9 +201,9 @@ struct Task {
 impl Task {
     fn solve(&self) -> Result<()> {
         let mut watch = Stopwatch::start();
-        let Loaded { scene, inspection } = self.load()?;
         // before the work, not after it
-        check_writable(&self.out)?;
+        check_place(&self.out)?;
+        let Loaded { scene, inspection } = self.load()?;
         watch.lap("input");
         let solved = match &self.place.master {
             None => self.compute(&scene, &mut watch)?,
@@ -213,21 +220,31 @@ impl Task {
 
     /// The same as a master gives back, computed here: what it took is in `watch`.
     fn compute(&self, scene: &Scene, watch: &mut Stopwatch) -> Result<SolvedThere> {
-        let begins = |plan: &Plan, before: &[Round]| self.begins(plan, before);
         let progress = Arc::new(Progress::default());
         let bar = Bar::of(&progress, self.notes.quiet);
         let run = Run {
             stop: &Stop::default(),
             progress: &progress,
         };
-        let kept = self.state.open()?;
+        let told = |warning: &str| self.notes.say("warning", warning);
+        let kept = self.state.open(told)?;
         let crew = self.workers.crew(self.settings.memory_GiB, self.notes)?;
         let workers = crew.as_ref().map(Crew::cluster);
+        let begins = |plan: &Plan, before: &[Round]| {
+            self.begins(plan, before);
+            if let Some(crew) = &crew {
+                crew.begin_round(plan);
+            }
+        };
         let solved = with_rows(workers, kept.as_ref(), |rows| {
             solve_in_rounds(scene, &self.settings, rows, &run, watch, begins)
-        })?;
+        });
         let untrusted = workers.map(|workers| workers.status().untrusted);
+        let remarks = crew.as_ref().map(|crew| crew.cluster().remarks());
         drop((crew, bar));
+        for remark in remarks.iter().flatten() {
+            self.notes.say("warning", remark);
+        }
         for worker in untrusted.unwrap_or_default() {
             let line = format!("worker {worker} returned wrong rows: they were computed anew");
             self.notes.say("warning", &line);
@@ -238,6 +255,7 @@ impl Task {
                 self.notes.say("warning", &warning);
             }
         }
+        let solved = solved?;
         Ok(SolvedThere {
             plan: serde_json::to_value(solved.plan_record())
                 .context("the plan cannot be written down")?,
@@ -312,24 +330,31 @@ impl Task {
             stages: &stages,
             resources: usage,
         })?;
-        if self.notes.quiet {
-            return Ok(());
+        // a master of an earlier version says nothing of it
+        let accuracy = Accuracy::deserialize(&solved.plan["accuracy"]).ok();
+        if !self.notes.quiet {
+            if let Some(accuracy) = &accuracy {
+                self.notes.say("accuracy", &accuracy.to_string());
+            }
+            let mut table = Vec::new();
+            terminal::write(&mut table, canopy, solution, usage)?;
+            self.notes.show(&table);
+            let place = self.out.display();
+            self.notes.say("done", &format!("results are in {place}"));
         }
-        self.say_accuracy(&solved.plan);
-        let mut table = Vec::new();
-        terminal::write(&mut table, canopy, solution, usage)?;
-        console::print(&table)?;
-        let place = self.out.display();
-        self.notes.say("done", &format!("results are in {place}"));
-        Ok(())
+        let missed = accuracy.and_then(|accuracy| self.missed(accuracy));
+        missed.map_or(Ok(()), |missed| Err(missed.into()))
     }
 
-    /// Says whether the accuracy was reached, and what the error comes from.
-    fn say_accuracy(&self, plan: &serde_json::Value) {
-        // a master of an earlier version says nothing of it
-        if let Ok(accuracy) = Accuracy::deserialize(&plan["accuracy"]) {
-            self.notes.say("accuracy", &accuracy.to_string());
-        }
+    /// The error of a solve whose results are those of an earlier round, for a finer one failed.
+    fn missed(&self, accuracy: Accuracy) -> Option<MissedTarget> {
+        let is_fault = accuracy.ended == Ended::Failed;
+        is_fault.then(|| MissedTarget {
+            asked_percent: accuracy.asked_percent,
+            reached_percent: accuracy.rounds.last().and_then(|r| r.reached_percent),
+            fault: accuracy.failure.unwrap_or_default(),
+            place: self.out.display().to_string(),
+        })
     }
 
     fn formats(&self) -> Formats {

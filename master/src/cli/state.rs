@@ -4,7 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::Args;
-use nestrad_cluster::store::Store;
+use nestrad_cluster::store::{Store, StoreError};
+use nestrad_engine::causes::causes;
 
 use super::numbers::positive;
 
@@ -22,13 +23,27 @@ pub(crate) struct StateFlags {
 }
 
 impl StateFlags {
-    /// Opens the store, if one is asked for.
-    pub(crate) fn open(&self) -> Result<Option<Store>> {
+    /// Opens the store, if one is asked for. A disk that cannot be written to is told, and nothing is kept; what
+    /// cannot be meant, such as the folder of another master, is an error.
+    pub(crate) fn open(&self, tell: impl FnOnce(&str)) -> Result<Option<Store>> {
+        let Some(dir) = &self.state else {
+            return Ok(None);
+        };
         let most_bytes = (self.state_size * (1u64 << 30) as f64) as u64;
-        let store = self
-            .state
-            .as_deref()
-            .map(|dir| Store::open(dir, most_bytes));
-        Ok(store.transpose()?)
+        match Store::open(dir, most_bytes) {
+            Ok(store) => {
+                if let Some(warning) = store.warning() {
+                    tell(&warning);
+                }
+                Ok(Some(store))
+            }
+            Err(error @ (StoreError::InUse { .. } | StoreError::NoFolder { .. })) => {
+                Err(error.into())
+            }
+            Err(error) => {
+                tell(&format!("no results are kept: {}", causes(&error)));
+                Ok(None)
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 use std::time::Duration;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use clap::Args;
 use nestrad_proto::channel::{self, Credentials};
 use nestrad_proto::v1;
@@ -11,6 +11,8 @@ use nestrad_service::client;
 use tokio::time::timeout;
 
 use super::console;
+use super::exit::Unanswered;
+use nestrad_common::printable::line as printable;
 
 /// A master answers within this.
 const ANSWER: Duration = Duration::from_secs(15);
@@ -40,7 +42,11 @@ impl StatusArgs {
             let mut master = client::client(channel);
             let answer = timeout(ANSWER, master.status(v1::StatusRequest {})).await;
             let answer = answer.unwrap_or_else(|_| Err(tonic::Status::unavailable("no answer")));
-            answer.map_err(|status| anyhow!("{}: {}", self.master, status.message()))
+            let answer = answer.map_err(|status| Unanswered {
+                master: self.master.clone(),
+                status,
+            });
+            Ok::<_, anyhow::Error>(answer?)
         })?;
         console::print(text(&status.into_inner()).as_bytes())
     }
@@ -54,7 +60,11 @@ fn text(status: &v1::StatusResponse) -> String {
     };
     line(
         "master",
-        format!("version {}, up {}", status.version, time(status.uptime_s)),
+        format!(
+            "version {}, up {}",
+            printable(&status.version),
+            time(status.uptime_s)
+        ),
     );
     let mebibytes = |bytes: u64| bytes as f64 / f64::from(1 << 20);
     line(
@@ -70,14 +80,15 @@ fn text(status: &v1::StatusResponse) -> String {
         line(
             "worker",
             format!(
-                "{}: {} threads, {:.1} GiB; {} jobs leased, {} done, {} lost; last message {} ago",
+                "{}: {} threads, {:.2} GiB; {} jobs leased, {} done, {} lost; last message {} ago{}",
                 printable(&worker.name),
                 worker.threads,
                 worker.memory_gi_b,
                 worker.leased,
                 worker.done,
                 worker.lost,
-                time(worker.silent_s)
+                time(worker.silent_s),
+                too_small(worker)
             ),
         );
     }
@@ -131,6 +142,12 @@ fn text(status: &v1::StatusResponse) -> String {
     text
 }
 
+fn too_small(worker: &v1::WorkerInfo) -> String {
+    let needs = worker.needs_memory_gi_b;
+    let said = |needs| format!("; idle: too small, the smallest block needs {needs:.2} GiB");
+    needs.map(said).unwrap_or_default()
+}
+
 fn solve(solve: &v1::SolveInfo) -> String {
     let size = format!("{} triangles, {} bands", solve.triangles, solve.bands);
     let state = match solve.state() {
@@ -153,11 +170,6 @@ fn solve(solve: &v1::SolveInfo) -> String {
         v1::SolveState::Unspecified => "in a state that this version does not know".to_owned(),
     };
     format!("{} ({size}) {state}", printable(&solve.solve_id))
-}
-
-/// What a master or worker calls itself must not steer a terminal.
-fn printable(text: &str) -> String {
-    text.chars().flat_map(char::escape_debug).collect()
 }
 
 fn time(seconds: f64) -> String {
@@ -183,6 +195,7 @@ mod tests {
             workers: vec![v1::WorkerInfo {
                 name: "a\u{1b}[2J".into(),
                 threads: 2,
+                needs_memory_gi_b: Some(1.204),
                 ..v1::WorkerInfo::default()
             }],
             untrusted_workers: vec!["b\u{1b} at 10.0.0.7".into()],
@@ -203,6 +216,7 @@ mod tests {
             "up 2 h 1 min",
             "2 threads",
             "at 10.0.0.7: it returned wrong rows",
+            "idle: too small, the smallest block needs 1.20 GiB",
             "exchange, 3 of 16",
             "left      2 min",
         ] {

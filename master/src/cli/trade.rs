@@ -8,20 +8,20 @@ use clap::Args;
 use nestrad_common::assemble;
 use nestrad_common::inputs::Inputs;
 use nestrad_common::options::Options;
+use nestrad_common::threads::Threads;
 use nestrad_engine::plan::Settings;
 use nestrad_engine::progress::Progress;
 use nestrad_engine::run::Run;
 use nestrad_engine::stop::Stop;
-use nestrad_results::check_writable;
 use nestrad_results::trade::request::Request;
 use nestrad_results::trade::setting::grid;
 use nestrad_results::trade::study::carry_out;
 use nestrad_results::trade::table::Comparison;
-use nestrad_results::trade::{About, write};
+use nestrad_results::trade::{About, check_place, write};
 use rayon::ThreadPoolBuilder;
 
 use super::bar::Bar;
-use super::console::{self, Notes};
+use super::console::Notes;
 use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
 
@@ -63,7 +63,7 @@ struct HowFlags {
     #[arg(long, value_name = "GIB", value_parser = positive, allow_negative_numbers = true)]
     memory: Option<f64>,
 
-    /// Number of threads, 0 for one per processor [default: 0]
+    /// Number of threads, 0 for one per processor, at most 4 for each [default: 0]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(0..=4096), allow_negative_numbers = true)]
     threads: Option<usize>,
 
@@ -85,8 +85,11 @@ impl TradeArgs {
             seed: how.seed,
             ..Options::default()
         })?;
-        let threads = inputs.options.threads.unwrap_or(0);
-        let pool = ThreadPoolBuilder::new().num_threads(threads).build();
+        let threads = Threads::asked(inputs.options.threads.unwrap_or(0));
+        if let Some(warning) = &threads.warning {
+            Notes { quiet: how.quiet }.say("warning", warning);
+        }
+        let pool = ThreadPoolBuilder::new().num_threads(threads.count).build();
         pool.context("cannot start threads")?
             .install(|| how.study(&inputs))
     }
@@ -97,11 +100,12 @@ impl HowFlags {
         let notes = Notes { quiet: self.quiet };
         let default = Settings::default();
         let seed = inputs.options.seed.unwrap_or(default.seed);
+        // before the work, not after it
+        check_place(&self.out)?;
         let loaded = assemble::load(inputs)?;
         for warning in &loaded.inspection.warnings {
             notes.say("warning", warning);
         }
-        check_writable(&self.out)?;
         let settings = grid(&loaded.scene.canopy, self.finest);
         let request = Request {
             scene: &loaded.scene,
@@ -136,7 +140,7 @@ impl HowFlags {
         }
         let mut table = Vec::new();
         comparison.write_choices(&mut table)?;
-        console::print(&table)?;
+        notes.show(&table);
         for (row, why) in comparison.failed() {
             notes.say("failed", &format!("{}: {why}", row.setting));
         }

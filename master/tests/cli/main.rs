@@ -4,6 +4,7 @@
 
 mod checks;
 mod desk;
+mod endless;
 mod generated;
 mod help;
 mod inputs;

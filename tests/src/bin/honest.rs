@@ -48,6 +48,7 @@ fn by_rays(name: &'static str, generated: &Generated) -> Result<Case, Fault> {
         sky_percent: 0.09,
         elements_percent: 0.2,
         soil_percent: 0.2,
+        thin: false,
     };
     let settings = Settings {
         estimator: Estimator::Rays,

@@ -7,7 +7,7 @@ use nestrad_proto::v1;
 use nestrad_proto::v1::worker_service_client::WorkerServiceClient;
 use nestrad_tests::calls::block_on;
 use nestrad_tests::desk::Desk;
-use nestrad_tests::processes::{Master, said};
+use nestrad_tests::processes::{Master, finish, program, said};
 use nestrad_tests::rogue::honest_join;
 use rcgen::{BasicConstraints, CertificateParams, IsCa, Issuer, KeyPair, KeyUsagePurpose};
 use tonic::Code;
@@ -67,7 +67,7 @@ fn tokens_open_one_service_each_and_are_never_logged() {
 
     let solve = ["solve", "scene.toml", "--out", "out", "--master", &url];
     let refused = desk.run(&solve);
-    assert_eq!(refused.status.code(), Some(1));
+    assert_eq!(refused.status.code(), Some(5));
     assert!(
         said(&refused).contains("expected a bearer token"),
         "{}",
@@ -172,6 +172,60 @@ fn certificates_prove_the_master_and_its_callers() {
     assert!(desk.tables("here") == desk.tables("there"));
 }
 
+#[test]
+fn a_certificate_that_is_refused_is_said_to_client_and_worker() {
+    let desk = Desk::new();
+    let ours = Authority::new(&desk, "ca");
+    ours.certify(&desk, "master");
+    let others = Authority::new(&desk, "other-ca");
+    others.certify(&desk, "stranger");
+    let path = |name: &str| desk.path(name).display().to_string();
+    let (cert, key, ca) = (path("master.pem"), path("master.key"), path("ca.pem"));
+    let tls = ["--tls-cert", &cert, "--tls-key", &key, "--client-ca", &ca];
+    let master = Master::start(&tls);
+    let url = format!("https://{}", master.address);
+    let begun = std::time::Instant::now();
+    let stranger = ["--cert", "stranger.pem", "--key", "stranger.key"];
+    let solve = ["solve", "scene.toml", "--out", "out", "--master", &url];
+    let status = ["status", "--master", &url];
+    let worker = ["--master", &url];
+    for ca in ["ca.pem", "other-ca.pem"] {
+        let expected = match ca {
+            "ca.pem" => "the master refuses the certificate of this caller (--cert)",
+            _ => "the certificate of the master is not trusted (--ca)",
+        };
+        let with = [&["--ca", ca][..], &stranger].concat();
+        let mut joins = std::process::Command::new(program("nestrad-worker"));
+        joins
+            .args([&worker[..], &with].concat())
+            .current_dir(desk.folder());
+        joins.stderr(std::process::Stdio::piped());
+        for output in [
+            desk.run(&[&solve[..], &with].concat()),
+            desk.run(&[&status[..], &with].concat()),
+            finish(joins),
+        ] {
+            assert!(!output.status.success());
+            assert!(said(&output).contains(expected), "{}", said(&output));
+        }
+    }
+    // nobody tries again what cannot succeed
+    assert!(begun.elapsed() < std::time::Duration::from_secs(30));
+}
+
+#[test]
+fn one_token_does_not_stand_for_clients_and_workers() {
+    let desk = Desk::new();
+    fs::write(desk.path("token"), CLIENT).unwrap();
+    let here = ["serve", "--listen", "127.0.0.1:0"];
+    let tokens = ["--client-token", "token", "--worker-token", "token"];
+    let output = desk.run(&[&here[..], &tokens].concat());
+    assert_eq!(output.status.code(), Some(1));
+    let said = said(&output);
+    assert!(said.contains("expected two tokens"), "{said}");
+    assert!(!said.contains("serves") && !said.contains(CLIENT), "{said}");
+}
+
 /// What a worker comes to that joins.
 fn joining(url: &str, credentials: &Credentials) -> Option<Code> {
     block_on(async {
@@ -238,5 +292,6 @@ fn other_machines_are_not_served_without_encryption_and_credentials() {
             "{more:?}: {}",
             said(&output)
         );
+        assert!(!said(&output).contains("serves"));
     }
 }

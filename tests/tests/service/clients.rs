@@ -88,7 +88,7 @@ fn ctrl_c_cancels_the_solve_at_the_master() {
     });
     signal(child.id(), "INT");
     let output = wait_for(child);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(130));
     assert!(said(&output).contains("cancelled"), "{}", said(&output));
     assert!(!desk.path("there").exists());
     until("it stops", || {
@@ -143,7 +143,7 @@ fn solves_that_wait_can_be_cancelled_too() {
         assert_eq!(last.state(), v1::SolveState::Cancelled);
     });
     let status = first.wait().unwrap();
-    assert_eq!(status.code(), Some(1));
+    assert_eq!(status.code(), Some(130));
 }
 
 #[test]

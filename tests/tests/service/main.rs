@@ -8,10 +8,16 @@
 
 mod access;
 mod clients;
+mod connections;
+mod endless;
 mod garbage;
 mod light;
 mod limits;
+mod logs;
 mod many_solves;
+mod missed;
+mod neighbours;
+mod numbers;
 mod python;
 mod results;
 mod stopping;

@@ -5,7 +5,7 @@
 use std::time::{Duration, Instant};
 
 use nestrad_proto::v1;
-use nestrad_tests::calls::{block_on, client, ended, one_leaf, start, upload};
+use nestrad_tests::calls::{block_on, client, ended, fetch, one_leaf, start, upload};
 use nestrad_tests::processes::{Master, until};
 
 #[test]
@@ -34,12 +34,7 @@ fn a_thousand_solves_through_one_master_leave_nothing_behind() {
             let id = start(&mut client, &scene, options).await;
             let last = ended(&mut client, &id).await;
             assert_eq!(last.state(), v1::SolveState::Finished, "{}", last.reason);
-            let request = v1::FetchResultsRequest {
-                solve_id: id,
-                table: v1::ResultTable::Triangles.into(),
-            };
-            let mut slices = client.fetch_results(request).await.unwrap().into_inner();
-            assert!(slices.message().await.unwrap().is_some());
+            fetch(&mut client, &id).await.unwrap();
         });
     };
     let closed = || master.metric("nestrad_connections") == 0.0;

@@ -84,7 +84,7 @@ fn a_master_that_is_stopped_takes_nothing_new_and_says_so() {
     assert_eq!(health.status(), ServingStatus::NotServing);
     assert_eq!(refused.message(), "the master is about to stop");
     signal(child.id(), "TERM");
-    assert_eq!(wait_for(child).status.code(), Some(1));
+    assert_eq!(wait_for(child).status.code(), Some(130));
     assert_eq!(master.terminate().code(), Some(0));
 }
 
@@ -107,7 +107,7 @@ fn a_time_to_drain_that_is_over_cancels() {
     until("it runs", || runs(&master));
     assert_eq!(master.terminate().code(), Some(0));
     let output = wait_for(child);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(130));
     assert!(!desk.path("out").exists());
 }
 
@@ -146,12 +146,12 @@ fn a_master_that_is_not_there_is_given_up() {
     let url = format!("http://{}", free.local_addr().unwrap());
     drop(free);
     let output = desk.run(&["solve", "scene.toml", "--out", "out", "--master", &url]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(5));
     assert!(
         said(&output).contains("cannot be reached"),
         "{}",
         said(&output)
     );
     let output = desk.run(&["status", "--master", &url]);
-    assert_eq!(output.status.code(), Some(1));
+    assert_eq!(output.status.code(), Some(5));
 }

@@ -4,7 +4,7 @@ use std::process::Command;
 
 use nestrad_tests::crew::{Solving, worker};
 use nestrad_tests::desk::Desk;
-use nestrad_tests::processes::{finish, program, said, until};
+use nestrad_tests::processes::{Master, finish, program, said, until};
 use nestrad_tests::rogue::Rogue;
 
 use super::{SCENE, maize};
@@ -106,6 +106,85 @@ fn a_full_disk_is_said_and_the_solve_goes_on() {
     let said = said(&output);
     assert!(said.contains("results are no longer kept"), "{said}");
     assert!(expected == desk.tables("there"));
+}
+
+#[test]
+fn a_state_that_cannot_be_written_at_the_start_is_said_and_the_solve_goes_on() {
+    let desk = Desk::new();
+    desk.done(&["solve", "scene.toml", "--out", "here"]);
+    let expected = desk.tables("here");
+    std::fs::create_dir(desk.path("device")).unwrap();
+    std::os::unix::fs::symlink("/dev/full", desk.path("device/results.redb")).unwrap();
+    // no folder can be made; a file that takes nothing; no file may be as large as an empty store
+    for (state, limit) in [
+        ("/proc/state", "unlimited"),
+        ("device", "unlimited"),
+        ("state", "512"),
+    ] {
+        let limited = format!("trap '' XFSZ; ulimit -f {limit}; exec \"$0\" \"$@\"");
+        let mut command = Command::new("bash");
+        command
+            .args(["-c", &limited])
+            .arg(program("nestrad"))
+            .args(["solve", "scene.toml", "--state", state, "--out", "there"])
+            .current_dir(desk.folder())
+            .stdout(std::process::Stdio::piped())
+            .stderr(std::process::Stdio::piped());
+        let output = finish(command);
+        assert!(output.status.success(), "{}", said(&output));
+        let said = said(&output);
+        assert!(said.contains("no results are kept"), "{state}: {said}");
+        assert!(expected == desk.tables("there"));
+    }
+    // a device is no file that one puts aside
+    assert!(desk.path("device/results.redb").is_symlink());
+    let file = desk.run(&[
+        "solve",
+        "scene.toml",
+        "--state",
+        "scene.toml",
+        "--out",
+        "there",
+    ]);
+    assert!(said(&file).contains("expected a folder"), "{}", said(&file));
+    let master = Master::start(&["--state", "/proc/state"]);
+    assert!(
+        master.log().contains("no results are kept"),
+        "{}",
+        master.log()
+    );
+}
+
+#[test]
+fn a_damaged_state_costs_time_and_shows_no_panic() {
+    let desk = Desk::new();
+    desk.done(&["solve", "scene.toml", "--out", "here"]);
+    let expected = desk.tables("here");
+    let args = ["solve", "scene.toml", "--state", "state", "--out", "there"];
+    desk.done(&args);
+    let path = desk.path("state/results.redb");
+    let whole = std::fs::read(&path).unwrap();
+    let pages = whole.len() / 4096;
+    for case in 0..8 {
+        let mut bytes = whole.clone();
+        match case {
+            0 => bytes.truncate(whole.len() / 2),
+            1 => bytes.truncate(5000),
+            2 => bytes[..320].fill(0xff),
+            // pages here and there, and all that is left of another file
+            _ => (case..pages).step_by(case).for_each(|page| {
+                bytes[4096 * page + 8 * case..][..64].fill(0x5a);
+            }),
+        }
+        std::fs::write(&path, bytes).unwrap();
+        let output = desk.done(&args);
+        assert!(
+            !said(&output).contains("panicked"),
+            "{case}: {}",
+            said(&output)
+        );
+        assert!(expected == desk.tables("there"), "{case}");
+    }
 }
 
 #[test]

@@ -6,6 +6,7 @@ mod alone;
 mod audits;
 mod bits;
 mod faults;
+mod hold_ups;
 mod kept;
 mod masters;
 mod memory;

@@ -15,6 +15,12 @@ pub const USED_NS: f64 = 50.0;
 /// To find, pack and use what a line sees on an organ, from both sides, ns.
 pub const MET_NS: f64 = SEGMENT_NS + 2.0 * USED_NS;
 
+/// To put a triangle into the frame, and its light into the results, ns.
+pub const READ_NS: f64 = 3000.0;
+
+/// To iterate over a row, and to work out its error, without its entries, ns.
+pub const SOLVED_NS: f64 = 1000.0;
+
 /// A point of a lattice of the exchange, ns.
 pub const LINE_NS: f64 = 9.0;
 

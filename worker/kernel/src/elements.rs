@@ -94,7 +94,8 @@ impl Elements {
     }
 }
 
-fn divisions(triangle: &[DVec3; 3], max_edge_m: f64) -> u32 {
+/// Pieces along an edge of a triangle whose pieces are to have edges of `max_edge_m` (metres, > 0) at most.
+pub fn divisions(triangle: &[DVec3; 3], max_edge_m: f64) -> u32 {
     let longest = geometry::longest_edge(triangle);
     // pieces are as slender as the triangle, so a slender one would have far more than its area needs
     let by_area = (MOST_PIECES * geometry::area(triangle)).sqrt() / max_edge_m;

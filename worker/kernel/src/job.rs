@@ -42,3 +42,27 @@ pub struct Batch {
     /// Rays from faces that lines sample too thinly, or from all faces.
     pub rays: Option<Rays>,
 }
+
+/// Up to so many lines in a row are as good as lines here and there.
+const IN_A_ROW: f64 = 4.0;
+
+impl Batch {
+    /// What is longer than this is met by several of the batch's lines at a time, metres.
+    pub fn lines_in_a_row_m(&self) -> f64 {
+        match self.lines.first() {
+            Some(lines) => IN_A_ROW * lines.line_area_m2.sqrt(),
+            None => f64::INFINITY,
+        }
+    }
+}
+
+impl Rays {
+    /// Rays in all batches of a half for a face of that area and that longest edge. What is long is met by many lines
+    /// of a lattice at a time, if by any: these are one sample.
+    pub fn of_half(&self, area_m2: f64, longest_m: f64, in_a_row_m: f64) -> u32 {
+        let at_a_time = (longest_m / in_a_row_m).max(1.0);
+        (self.least_samples - area_m2 * self.lines_per_m2 / at_a_time)
+            .ceil()
+            .max(0.0) as u32
+    }
+}

@@ -82,19 +82,28 @@ impl Seen {
     /// The rows of the block that it was found in.
     ///
     /// Pairs are sorted first into runs of rows, then by counting within each run, so that neither reaches
-    /// over more memory than a cache holds; then each row.
-    pub fn rows(&self, block: &Block) -> Rows {
-        let mut runs: Vec<Vec<Pair>> = vec![Vec::new(); block.rows().div_ceil(SORTED_TOGETHER)];
+    /// over more memory than a cache holds; then each row. What has been read is freed: a batch of a large scene
+    /// is hundreds of MB.
+    pub fn rows(self, block: &Block) -> Rows {
+        let count = block.rows().div_ceil(SORTED_TOGETHER);
+        let mut counts = self.counts(0);
+        let entries = 2 * counts.segments as usize + self.looks.len();
+        // most runs have as many, give or take a quarter
+        let room = entries / count.max(1) / 4 * 5;
+        let mut runs: Vec<Vec<Pair>> = Vec::new();
+        runs.resize_with(count, || Vec::with_capacity(room));
         let mut put = |from: u32, seen: u32| {
             if let Some(row) = block.row_of(from) {
                 runs[row as usize / SORTED_TOGETHER].push((row, block.number_of(seen)));
             }
         };
-        for &(a, b) in self.pairs.iter().flatten() {
-            put(a, b);
-            put(b, a);
+        for pairs in self.pairs {
+            for (a, b) in pairs {
+                put(a, b);
+                put(b, a);
+            }
         }
-        for &(a, b) in &self.looks {
+        for (a, b) in self.looks {
             put(a, b);
         }
         let (lengths, ends): (Vec<Vec<u32>>, Vec<Vec<u32>>) = runs
@@ -105,11 +114,15 @@ impl Seen {
                 sorted_by_row(&entries, first..(first + SORTED_TOGETHER).min(block.rows()))
             })
             .unzip();
-        let ends = ends.concat();
+        let mut all = Vec::with_capacity(ends.iter().map(Vec::len).sum());
+        for ends in ends {
+            all.extend_from_slice(&ends);
+        }
+        counts.row_entries = all.len() as u64;
         Rows {
             lengths: lengths.concat(),
-            counts: self.counts(ends.len() as u64),
-            ends,
+            ends: all,
+            counts,
         }
     }
 

@@ -11,7 +11,7 @@ use nestrad_proto::v1::{
     RenewRequest, ReturnRowsRequest, RowsHeader, fetch_block_response, lease_response,
     return_rows_request,
 };
-use nestrad_proto::{MAX_MESSAGE_BYTES, SLICE_BYTES};
+use nestrad_proto::{MAX_MESSAGE_BYTES, SLICE_BYTES, reason};
 use tonic::{Code, Request, Status};
 
 use super::{FIRST_PAUSE, LAST_PAUSE, Offer};
@@ -163,7 +163,7 @@ pub(super) async fn again<T, F: Future<Output = Result<T, Status>>>(
     loop {
         match call().await {
             Err(status) if may_pass(&status) => {
-                tracing::warn!(reason = status.message(), "trying again in {pause:?}");
+                tracing::warn!(reason = reason::of(&status), "trying again in {pause:?}");
                 tokio::time::sleep(pause).await;
                 pause = (2 * pause).min(LAST_PAUSE);
             }

@@ -9,6 +9,7 @@ use std::sync::Arc;
 use std::time::Duration;
 
 use nestrad_proto::channel::Authorized;
+use nestrad_proto::reason;
 use thiserror::Error;
 use tokio::sync::watch;
 use tonic::{Code, Status};
@@ -73,11 +74,11 @@ pub async fn serve(
                 }
             }
             Err(status) if is_final(&status) => {
-                return Err(ServingError::TurnedAway(status.message().to_owned()));
+                return Err(ServingError::TurnedAway(reason::of(&status)));
             }
             Err(status) => {
                 tracing::warn!(
-                    reason = status.message(),
+                    reason = reason::of(&status),
                     "cannot join, trying again in {pause:?}"
                 );
                 tokio::select! {
@@ -92,12 +93,13 @@ pub async fn serve(
 
 /// Whether trying again is of no use.
 fn is_final(status: &Status) -> bool {
-    matches!(
-        status.code(),
-        Code::FailedPrecondition
-            | Code::InvalidArgument
-            | Code::Unauthenticated
-            | Code::PermissionDenied
-            | Code::Unimplemented
-    )
+    reason::of_credentials(status).is_some()
+        || matches!(
+            status.code(),
+            Code::FailedPrecondition
+                | Code::InvalidArgument
+                | Code::Unauthenticated
+                | Code::PermissionDenied
+                | Code::Unimplemented
+        )
 }

@@ -1,6 +1,7 @@
 //! From joining a master to leaving it.
 
 use std::collections::BTreeSet;
+use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
@@ -36,6 +37,8 @@ pub(super) struct Session {
     heartbeat: Duration,
     /// Leases that are held.
     leases: Mutex<BTreeSet<u64>>,
+    /// Memory that it was said to lack, bytes.
+    needs_bytes: AtomicU64,
 }
 
 impl Session {
@@ -47,6 +50,7 @@ impl Session {
             worker_id: joined.worker_id,
             heartbeat: heartbeat.clamp(Duration::from_millis(10), Duration::from_secs(3600)),
             leases: Mutex::default(),
+            needs_bytes: AtomicU64::new(0),
         })
     }
 
@@ -160,10 +164,25 @@ impl Session {
             };
             match answer {
                 Ok(lease_response::Answer::Job(job)) => return Ok(Next::Job(Box::new(job))),
-                Ok(lease_response::Answer::Nothing(_)) => {}
+                Ok(lease_response::Answer::Nothing(nothing)) => {
+                    self.lacks_memory(nothing.needs_memory_bytes);
+                }
                 Ok(lease_response::Answer::Drain(_)) => return Ok(Next::End(End::Drained)),
                 Err(status) => return Err(lost(&status)),
             }
+        }
+    }
+
+    /// The master has no job for a worker with so little memory: says so, once.
+    fn lacks_memory(&self, needs_bytes: u64) {
+        const GIB: f64 = (1u64 << 30) as f64;
+        let known = self.needs_bytes.swap(needs_bytes, Ordering::Relaxed);
+        if needs_bytes > 0 && needs_bytes != known {
+            let needs = needs_bytes as f64 / GIB;
+            tracing::warn!(
+                "idle: the smallest block needs {needs:.2} GiB of memory: give this worker more --memory, or \
+                 fewer --threads"
+            );
         }
     }
 

@@ -239,7 +239,7 @@ fn patterns_without_area_and_soil_nowhere_are_refused() {
     let case = Case::new(LEAF).pattern([1.0, 0.0, 1.0, 5.0]);
     assert_eq!(
         case.refusal(),
-        "pattern: expected corners that differ in x and in y, found 1 0 1 5"
+        "pattern: expected corners 1e-9 or more apart in x and in y, in the file's unit and in metres, found 1 0 1 5"
     );
     for bad in [f64::NAN, f64::NEG_INFINITY, 2e12] {
         let refusal = Case::new(LEAF).soil(bad).refusal();
@@ -251,7 +251,10 @@ fn patterns_without_area_and_soil_nowhere_are_refused() {
 fn bands_must_differ_in_name() {
     let mut case = Case::new(LEAF);
     case.inputs.bands.push(case.inputs.bands[0].clone());
-    assert!(case.refusal().ends_with("found 'PAR' twice or empty"));
+    assert!(
+        case.refusal()
+            .ends_with("found 'PAR' twice, empty or too long")
+    );
 }
 
 #[test]

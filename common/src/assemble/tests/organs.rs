@@ -90,8 +90,8 @@ fn kinds_are_declared_for_materials_and_species() {
     let canopy = &loaded.scene.canopy;
     let (stem, soil, built) = (Kind::Stem, Kind::Soil, Kind::Structure);
     assert_eq!(canopy.kinds(), [Kind::Leaf, built, stem, soil]);
-    // a structure has two faces, a stem of OBJ is no solid
-    assert_eq!(canopy.may_be_solid(), [false; 4]);
+    // a structure has two faces, an opaque stem may be solid in any format
+    assert_eq!(canopy.may_be_solid(), [false, false, true, false]);
     assert_eq!(canopy.plants(), [true, false, true, true]);
     let organs = [Some(Kind::Leaf), Some(built), None, Some(stem)];
     assert_eq!(canopy.organ_kinds(), organs);

@@ -15,7 +15,7 @@ use super::tables::{
 };
 use crate::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
 use crate::light::Sky;
-use crate::optics::{FaceOptics, LeafOptics};
+use crate::optics::{AN_ALBEDO, FaceOptics, LeafOptics, is_albedo};
 
 /// Paths become relative to what `folder` is relative to.
 pub(super) fn inputs(
@@ -100,8 +100,8 @@ fn band(
                 "both",
             ));
         }
-        if !(0.0..=1.0).contains(albedo.as_ref()) {
-            return Err(text.fault(&albedo.span(), "an albedo from 0 to 1", albedo.as_ref()));
+        if !is_albedo(*albedo.as_ref()) {
+            return Err(text.fault(&albedo.span(), AN_ALBEDO, albedo.as_ref()));
         }
     }
     let mut materials = BTreeMap::new();

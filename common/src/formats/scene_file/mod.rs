@@ -38,7 +38,6 @@ mod tables;
 #[cfg(test)]
 mod tests;
 
-use std::borrow::Cow;
 use std::fmt::Display;
 use std::ops::Range;
 use std::path::Path;
@@ -46,10 +45,12 @@ use std::path::Path;
 use tables::SceneFile;
 
 use super::error::{FormatError, Place};
+use crate::bounded::with_line_feeds;
 use crate::inputs::Inputs;
 
 /// Parses a scene file; `file` is its name in messages, `folder` what its paths are relative to.
 pub fn parse(file: &str, bytes: &[u8], folder: &Path) -> Result<Inputs, FormatError> {
+    // TOML knows no carriage return that ends a line by itself; other files of ours do
     let bytes = with_line_feeds(bytes);
     let text = Text::new(file, &bytes)?;
     let raw: SceneFile = toml::from_str(text.text).map_err(|error| {
@@ -61,19 +62,6 @@ pub fn parse(file: &str, bytes: &[u8], folder: &Path) -> Result<Inputs, FormatEr
         }
     })?;
     checks::inputs(raw, &text, folder)
-}
-
-/// TOML knows no carriage return that ends a line by itself; other files of ours do.
-fn with_line_feeds(bytes: &[u8]) -> Cow<'_, [u8]> {
-    let lone = |at: &usize| bytes[*at] == b'\r' && bytes.get(at + 1) != Some(&b'\n');
-    if !(0..bytes.len()).any(|at| lone(&at)) {
-        return bytes.into();
-    }
-    let mut ended = bytes.to_vec();
-    for at in (0..bytes.len()).filter(lone) {
-        ended[at] = b'\n';
-    }
-    ended.into()
 }
 
 /// The text, to turn positions into line numbers.

@@ -210,6 +210,10 @@ fn what_is_wrong_is_named_with_its_line() {
             "a.toml, line 2: invalid value: integer `-1`",
         ),
         (
+            "[options]\nthreads = 70000\n",
+            "a.toml, line 1: threads: expected a whole number from 0 to 4096, found 70000",
+        ),
+        (
             "[options]\n\naccuracy_percent = 0\n",
             "a.toml, line 1: accuracy: expected a number above 0",
         ),

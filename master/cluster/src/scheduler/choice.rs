@@ -16,29 +16,35 @@ impl Scheduler {
             .collect();
         solves.sort_unstable();
         let waiting = solves.iter().find_map(|&(_, id)| {
-            let job = self.solves[&id].next_waiting(id, known, &self.rules, held)?;
+            let job = self.solves[&id].next_waiting(known, &self.rules, held)?;
             Some((id, job))
         });
         waiting.or_else(|| self.straggler(now, worker, known))
     }
 
-    /// The job that takes longest, against what it should, among those that one other worker has.
+    /// The job that takes longest, against what it should, among those that others have: one more may have it where
+    /// it takes twice as long, a third where it takes eight times as long, and so on.
     fn straggler(&self, now: Time, worker: Id, known: &Worker) -> Option<(Id, usize)> {
+        const PATIENCE_WITH_ONE_MORE: f64 = 4.0;
         let mut worst: Option<(f64, Id, usize)> = None;
         for lease in self.leases.values().filter(|l| l.until.is_some()) {
             let Some(solve) = self.solves.get(&lease.solve) else {
                 continue;
             };
             let takes_s = now.saturating_sub(lease.since).as_secs_f64();
+            // what a job should take goes by what workers said; that is not to hold it back for ever
             let patience_s = (self.rules.straggle * solve.expected_s(lease.job))
+                .min(self.rules.lease.as_secs_f64())
                 .max(self.rules.least_straggle.as_secs_f64());
-            let late = takes_s / patience_s;
+            let active = &solve.jobs[lease.job].active;
+            let more = active.len().saturating_sub(1) as i32;
+            let late = takes_s / (patience_s * PATIENCE_WITH_ONE_MORE.powi(more));
+            let has_it = |id: &Id| self.leases.get(id).is_some_and(|l| l.worker == worker);
             if late >= 1.0
                 && worst.is_none_or(|(most, ..)| late > most)
-                && solve.jobs[lease.job].active.len() == 1
-                && lease.worker != worker
+                && !active.iter().any(has_it)
                 && solve.fits(lease.job, known)
-                && known.trusted_with(lease.solve, lease.job, &self.rules)
+                && solve.trusts(known, lease.job, &self.rules)
             {
                 worst = Some((late, lease.solve, lease.job));
             }
@@ -50,17 +56,11 @@ impl Scheduler {
 impl Solve {
     /// The largest job that waits, of the blocks that the worker holds; else of the block that has most
     /// jobs for those who work on it.
-    fn next_waiting(
-        &self,
-        id: Id,
-        worker: &Worker,
-        rules: &Rules,
-        held: &[BlockId],
-    ) -> Option<usize> {
+    fn next_waiting(&self, worker: &Worker, rules: &Rules, held: &[BlockId]) -> Option<usize> {
         let first_of = |block: usize| {
             let of = &self.blocks[block];
             let mut jobs = of.waiting.iter();
-            jobs.find(|&&(_, job)| worker.trusted_with(id, job, rules))
+            jobs.find(|&&(_, job)| self.trusts(worker, job, rules))
         };
         let open = |block: &usize| {
             !self.blocks[*block].waiting.is_empty() && self.block_fits(*block, worker)
@@ -81,14 +81,5 @@ impl Solve {
             (wb * aa).cmp(&(wa * ab)).then(a.cmp(&b))
         });
         others.into_iter().find_map(first_of).map(|&(_, job)| job)
-    }
-}
-
-impl Worker {
-    /// Whether it did not fail a job too often.
-    pub(super) fn trusted_with(&self, solve: Id, job: usize, rules: &Rules) -> bool {
-        self.failures
-            .get(&(solve, job))
-            .is_none_or(|&n| n < rules.failures_on_a_worker)
     }
 }

@@ -28,6 +28,9 @@ impl Scheduler {
         if known.leases.len() >= known.most_leases() {
             return Err(Refusal::TooMany(known.leases.len()));
         }
+        if !known.may_lease() {
+            return Ok(None);
+        }
         let Some((solve, job)) = self.choose(now, worker, held) else {
             return Ok(None);
         };
@@ -45,6 +48,7 @@ impl Scheduler {
         );
         if let Some(known) = self.workers.get_mut(&worker) {
             known.leases.insert(lease);
+            known.told = None;
         }
         let Some(of) = self.solves.get_mut(&solve) else {
             return Ok(None);
@@ -107,23 +111,30 @@ impl Scheduler {
             known.counts.done += 1;
         }
         let solve = self.solves.get_mut(&held.solve)?;
-        solve.took(held.job, compute_s);
+        // it cannot have taken longer than since it was given out
+        let most_s = now.saturating_sub(held.since).as_secs_f64();
+        solve.took(held.job, compute_s.min(most_s));
         let used = solve.done(held.job);
-        // other leases of the job are void
+        let block = solve.jobs[held.job].spec.block;
+        self.void_leases(held.solve, held.job);
+        used.then_some(Leased {
+            lease,
+            solve: held.solve,
+            job: held.job,
+            block,
+        })
+    }
+
+    /// Takes back all leases of a job that is done.
+    pub(super) fn void_leases(&mut self, solve: Id, job: usize) {
         let (workers, leases) = (&mut self.workers, &mut self.leases);
         leases.retain(|id, l| {
-            let same = (l.solve, l.job) == (held.solve, held.job);
+            let same = (l.solve, l.job) == (solve, job);
             if same {
                 release(workers, l.worker, *id);
             }
             !same
         });
-        used.then_some(Leased {
-            lease,
-            solve: held.solve,
-            job: held.job,
-            block: solve.jobs[held.job].spec.block,
-        })
     }
 
     /// A worker does not want, or was not able, to do a job; or its result was refused.
@@ -177,22 +188,18 @@ impl Scheduler {
             .map(|(&id, _)| id)
             .collect();
         for worker in silent {
-            self.leave(worker);
+            self.leave(now, worker);
         }
     }
 
     fn failed(&mut self, lease: &Lease, reason: &str) {
         self.lost += 1;
-        let name = match self.workers.get_mut(&lease.worker) {
-            Some(worker) => {
-                worker.counts.lost += 1;
-                *worker.failures.entry((lease.solve, lease.job)).or_default() += 1;
-                worker.facts.name.clone()
-            }
-            None => String::new(),
+        let Some(worker) = self.workers.get_mut(&lease.worker) else {
+            return;
         };
+        worker.counts.lost += 1;
         if let Some(solve) = self.solves.get_mut(&lease.solve) {
-            solve.failed(lease.job, &name, reason, &self.rules);
+            solve.failed(lease.job, &worker.facts, reason);
         }
     }
 

@@ -18,8 +18,8 @@ use std::sync::Arc;
 
 use leases::{Lease, release};
 use solve::Solve;
-pub use solve::{SolveCounts, SolveEnd};
-pub use terms::{BlockId, BlockSpec, Id, JobSpec, Leased, Refusal, Rules, Time};
+pub use solve::SolveCounts;
+pub use terms::{BlockId, BlockSpec, Id, Identity, JobSpec, Leased, Refusal, Rules, Time};
 use worker::Worker;
 pub use worker::{WorkerCounts, WorkerFacts};
 
@@ -32,6 +32,8 @@ pub struct Scheduler {
     solves: BTreeMap<Id, Solve>,
     leases: BTreeMap<Id, Lease>,
     lost: u64,
+    /// Since when there has been no worker at all.
+    deserted: Option<Time>,
 }
 
 impl Scheduler {
@@ -45,6 +47,7 @@ impl Scheduler {
             solves: BTreeMap::new(),
             leases: BTreeMap::new(),
             lost: 0,
+            deserted: Some(Time::ZERO),
         }
     }
 
@@ -58,14 +61,31 @@ impl Scheduler {
     pub fn join(&mut self, now: Time, facts: WorkerFacts) -> Id {
         let id = self.new_id();
         self.workers.insert(id, Worker::new(facts, now));
+        self.deserted = None;
         id
     }
 
     /// A worker goes; its jobs wait again.
-    pub fn leave(&mut self, worker: Id) {
+    pub fn leave(&mut self, now: Time, worker: Id) {
         if self.workers.remove(&worker).is_some() {
             self.drop_leases_of(worker);
+            if self.workers.is_empty() {
+                self.deserted = Some(now);
+            }
         }
+    }
+
+    /// Nobody is there any more.
+    pub fn all_leave(&mut self, now: Time) {
+        let all: Vec<Id> = self.workers.keys().copied().collect();
+        for worker in all {
+            self.leave(now, worker);
+        }
+    }
+
+    /// How long there has been no worker at all; `None` where there is one.
+    pub fn deserted_for(&self, now: Time) -> Option<Time> {
+        self.deserted.map(|since| now.saturating_sub(since))
     }
 
     /// New work.
@@ -79,9 +99,6 @@ impl Scheduler {
     pub fn end(&mut self, solve: Id) {
         self.solves.remove(&solve);
         let workers = &mut self.workers;
-        for worker in workers.values_mut() {
-            worker.failures.retain(|&(of, _), _| of != solve);
-        }
         self.leases.retain(|id, lease| {
             if lease.solve == solve {
                 release(workers, lease.worker, *id);
@@ -93,8 +110,10 @@ impl Scheduler {
     /// Marks a job as done without a worker: its result was kept from before, or computed here. Whether it
     /// had none before.
     pub fn known(&mut self, solve: Id, job: usize) -> bool {
-        let solve = self.solves.get_mut(&solve);
-        solve.is_some_and(|solve| solve.done(job))
+        let of = self.solves.get_mut(&solve);
+        let first = of.is_some_and(|of| of.done(job));
+        self.void_leases(solve, job);
+        first
     }
 
     /// Whether there is a worker that can do what is left of a solve, or some of it.
@@ -110,17 +129,58 @@ impl Scheduler {
         left.any(|block| self.workers.values().any(|w| solve.block_fits(block, w)))
     }
 
-    /// A job that nobody is at, and its block.
-    pub fn waiting(&self, solve: Id) -> Option<(usize, usize)> {
-        let blocks = &self.solves.get(&solve)?.blocks;
-        let mut blocks = blocks.iter().enumerate();
-        blocks.find_map(|(number, block)| Some((block.waiting.first()?.1, number)))
+    /// Jobs of one block that nobody is at, a few; where there are none, those that others have had for longest, and
+    /// for more than a moment.
+    pub fn for_the_master(&self, now: Time, solve: Id, most: usize) -> Vec<usize> {
+        let Some(of) = self.solves.get(&solve) else {
+            return Vec::new();
+        };
+        let waiting = of.blocks.iter().find(|block| !block.waiting.is_empty());
+        if let Some(block) = waiting {
+            let jobs = block.waiting.iter().map(|&(_, job)| job);
+            return jobs.take(most).collect();
+        }
+        let old = |lease: &&Lease| {
+            let is_old = now.saturating_sub(lease.since) >= self.rules.least_straggle;
+            lease.solve == solve && is_old && !of.jobs[lease.job].done
+        };
+        let mut since = BTreeMap::new();
+        for lease in self.leases.values().filter(old) {
+            let first = since.entry(lease.job).or_insert(lease.since);
+            *first = lease.since.min(*first);
+        }
+        let mut held: Vec<(Time, usize)> = since.into_iter().map(|(job, at)| (at, job)).collect();
+        held.sort_unstable();
+        let Some(&(_, first)) = held.first() else {
+            return Vec::new();
+        };
+        let same_block = |job: &usize| of.jobs[*job].spec.block == of.jobs[first].spec.block;
+        let jobs = held.into_iter().map(|(_, job)| job).filter(same_block);
+        jobs.take(most).collect()
     }
 
-    /// How a solve ended; `None` while it goes on.
-    pub fn end_of(&self, solve: Id) -> Option<SolveEnd> {
+    /// A job that failed on several workers, or on every worker that could do it, and why it failed last. Nobody is
+    /// kept from it, but it is not to wait for another.
+    pub fn failing(&self, solve: Id) -> Option<(usize, &str)> {
         let of = self.solves.get(&solve)?;
-        of.end_of(solve, &self.workers, &self.rules)
+        of.failing(&self.workers, &self.rules)
+    }
+
+    /// Memory that the smallest block needs of a worker, bytes, where that has less: it gets no job of any solve.
+    fn too_small_for(&self, worker: &Worker) -> Option<u64> {
+        let needs = self.solves.values().filter_map(|of| of.least_bytes(worker));
+        needs
+            .min()
+            .filter(|&bytes| bytes > worker.facts.memory_bytes)
+    }
+
+    /// What a worker lacks memory for, bytes, and whether it has not been told so yet.
+    pub fn tell_too_small(&mut self, worker: Id) -> Option<(u64, bool)> {
+        let needs = self.too_small_for(self.workers.get(&worker)?)?;
+        let known = self.workers.get_mut(&worker)?;
+        let is_news = known.told != Some(needs);
+        known.told = Some(needs);
+        Some((needs, is_news))
     }
 
     /// Jobs of a solve by state.
@@ -140,7 +200,8 @@ impl Scheduler {
 
     /// All workers.
     pub fn workers(&self, now: Time) -> Vec<WorkerCounts> {
-        self.workers.values().map(|w| w.counts(now)).collect()
+        let all = self.workers.values();
+        all.map(|w| w.counts(now, self.too_small_for(w))).collect()
     }
 
     /// Memory and threads of all workers.
@@ -148,15 +209,14 @@ impl Scheduler {
         self.workers.values().map(|w| &w.facts)
     }
 
-    /// Who a worker is.
-    pub fn identity(&self, worker: Id) -> Option<Arc<str>> {
-        self.workers.get(&worker).map(|w| w.facts.identity.clone())
+    /// What a worker said of itself.
+    pub fn facts_of(&self, worker: Id) -> Option<&WorkerFacts> {
+        self.workers.get(&worker).map(|w| &w.facts)
     }
 
-    /// All workers of an identity go.
-    pub fn dismiss(&mut self, identity: &str) {
-        let of =
-            |(&id, worker): (&Id, &Worker)| (*worker.facts.identity == *identity).then_some(id);
+    /// All workers that are called so go.
+    pub fn dismiss(&mut self, who: &str) {
+        let of = |(&id, worker): (&Id, &Worker)| (*worker.facts.who == *who).then_some(id);
         let theirs: Vec<Id> = self.workers.iter().filter_map(of).collect();
         for worker in theirs {
             self.leave(worker);

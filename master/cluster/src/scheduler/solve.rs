@@ -4,17 +4,11 @@ use std::cmp::Reverse;
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::AddAssign;
 
-use super::worker::Worker;
-use super::{BlockSpec, Id, JobSpec, Rules};
+use super::worker::{Worker, WorkerFacts};
+use super::{BlockSpec, Id, Identity, JobSpec, Rules};
 
-/// How a solve stands.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub enum SolveEnd {
-    /// All jobs are done.
-    Done,
-    /// A job cannot be done; the reason.
-    Failed(String),
-}
+/// Workers that are remembered to have failed a job.
+const MOST_REMEMBERED: usize = 64;
 
 /// Jobs of a solve by state.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -41,7 +35,6 @@ pub(super) struct Solve {
     pub(super) jobs: Vec<Job>,
     /// Jobs that are not done, and have failed.
     suspects: BTreeSet<usize>,
-    failed: Option<String>,
     left: usize,
     /// What finished jobs took, and were expected to take, seconds.
     took_s: f64,
@@ -63,7 +56,8 @@ pub(super) struct Job {
     /// Leases that are not lost.
     pub(super) active: BTreeSet<Id>,
     pub(super) done: bool,
-    failures: u32,
+    /// Who failed it how often.
+    failures: Vec<(Identity, u32)>,
     last_reason: String,
 }
 
@@ -85,12 +79,11 @@ impl Solve {
                     spec,
                     active: BTreeSet::new(),
                     done: false,
-                    failures: 0,
+                    failures: Vec::new(),
                     last_reason: String::new(),
                 })
                 .collect(),
             suspects: BTreeSet::new(),
-            failed: None,
             took_s: 0.0,
             cost_s: 0.0,
         };
@@ -146,20 +139,29 @@ impl Solve {
         true
     }
 
-    pub(super) fn failed(&mut self, job: usize, worker: &str, reason: &str, rules: &Rules) {
+    pub(super) fn failed(&mut self, job: usize, worker: &WorkerFacts, reason: &str) {
         let of = &mut self.jobs[job];
         if of.done {
             return;
         }
-        of.failures += 1;
-        of.last_reason = format!("worker '{worker}': {reason}");
-        self.suspects.insert(job);
-        if of.failures >= rules.failures_of_a_job {
-            self.failed = Some(format!(
-                "near-field job {job} failed {} times, last on {}",
-                of.failures, of.last_reason
-            ));
+        let own = of
+            .failures
+            .iter()
+            .position(|(who, _)| *who == worker.identity);
+        if let Some(own) = own {
+            of.failures[own].1 += 1;
+        } else if of.failures.len() < MOST_REMEMBERED {
+            of.failures.push((worker.identity, 1));
         }
+        of.last_reason = format!("worker '{}': {reason}", worker.name);
+        self.suspects.insert(job);
+    }
+
+    /// Whether a worker did not fail a job too often, under whatever number.
+    pub(super) fn trusts(&self, worker: &Worker, job: usize, rules: &Rules) -> bool {
+        let mut failures = self.jobs[job].failures.iter();
+        let own = failures.find(|(who, _)| *who == worker.facts.identity);
+        own.is_none_or(|&(_, times)| times < rules.failures_on_a_worker)
     }
 
     pub(super) fn took(&mut self, job: usize, compute_s: f64) {
@@ -184,31 +186,21 @@ impl Solve {
         left.map(|(k, _)| self.expected_s(k)).sum()
     }
 
-    /// How the solve ends, once it does.
-    pub(super) fn end_of(
+    /// A job that failed on several workers, or on every one that could do it, and why it failed last.
+    pub(super) fn failing(
         &self,
-        id: Id,
         workers: &BTreeMap<Id, Worker>,
         rules: &Rules,
-    ) -> Option<SolveEnd> {
-        if let Some(reason) = &self.failed {
-            return Some(SolveEnd::Failed(reason.clone()));
-        }
-        if self.left == 0 {
-            return Some(SolveEnd::Done);
-        }
-        let hopeless = self.suspects.iter().find(|&&job| {
-            self.jobs[job].active.is_empty()
-                && workers.values().any(|w| self.fits(job, w))
-                && workers
-                    .values()
-                    .filter(|w| self.fits(job, w))
-                    .all(|w| !w.trusted_with(id, job, rules))
+    ) -> Option<(usize, &str)> {
+        let job = *self.suspects.iter().find(|&&job| {
+            let is_stuck = || {
+                let mut fitting = workers.values().filter(|w| self.fits(job, w)).peekable();
+                fitting.peek().is_some() && fitting.all(|w| !self.trusts(w, job, rules))
+            };
+            let of = &self.jobs[job];
+            of.failures.len() >= rules.workers_failing_a_job || (of.active.is_empty() && is_stuck())
         })?;
-        Some(SolveEnd::Failed(format!(
-            "near-field job {hopeless} failed on every worker, last on {}",
-            self.jobs[*hopeless].last_reason
-        )))
+        Some((job, &self.jobs[job].last_reason))
     }
 
     /// Whether a worker has the memory for a job.
@@ -220,6 +212,14 @@ impl Solve {
         let facts = &worker.facts;
         let demand = &self.blocks[block].spec.demand;
         demand.worker_bytes(facts.threads, 1) <= facts.memory_bytes
+    }
+
+    /// Memory that a worker needs for the smallest block of which there is something to do, bytes.
+    pub(super) fn least_bytes(&self, worker: &Worker) -> Option<u64> {
+        let left = |block: &&Block| !block.waiting.is_empty() || block.active > 0;
+        let blocks = self.blocks.iter().filter(left);
+        let needs = blocks.map(|block| block.spec.demand.worker_bytes(worker.facts.threads, 1));
+        needs.min()
     }
 
     /// Leases of all jobs.

@@ -7,6 +7,9 @@ use thiserror::Error;
 /// Content of a block: names it among all solves.
 pub type BlockId = [u8; 32];
 
+/// Who a worker is, however often it leaves and joins again.
+pub type Identity = [u8; 32];
+
 /// Numbers of workers, solves and leases; none is used twice.
 pub type Id = u64;
 
@@ -20,10 +23,11 @@ pub struct Rules {
     pub lease: Duration,
     /// A job that failed or was lost so often on one worker is not given to it again.
     pub failures_on_a_worker: u32,
-    /// A job that failed or was lost so often altogether fails its solve.
-    pub failures_of_a_job: u32,
+    /// A job that failed or was lost on so many workers is computed by the master, unless another is faster.
+    pub workers_failing_a_job: usize,
     /// A job is given out a second time when it takes so many times what it should, and at least
-    /// `least_straggle`.
+    /// `least_straggle`; whatever it should take, after a lease time. To a third worker after four times that
+    /// time, and so on.
     pub straggle: f64,
     /// See `straggle`.
     pub least_straggle: Duration,
@@ -34,7 +38,7 @@ impl Default for Rules {
         Self {
             lease: Duration::from_secs(30),
             failures_on_a_worker: 2,
-            failures_of_a_job: 8,
+            workers_failing_a_job: 3,
             straggle: 2.0,
             least_straggle: Duration::from_secs(1),
         }

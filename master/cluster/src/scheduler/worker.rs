@@ -1,18 +1,25 @@
 //! What the scheduler knows of a worker.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 use std::sync::Arc;
 use std::time::Duration;
 
-use super::{Id, Time};
+use super::{Id, Identity, Time};
+
+/// Jobs that a worker may hold before it has returned any, and those that each result allows it besides: who only
+/// says that it has many threads does not get all jobs there are.
+const LEASES_AT_FIRST: u64 = 64;
+const LEASES_A_RESULT: u64 = 2;
 
 /// What a worker said of itself.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct WorkerFacts {
     /// For people to read.
     pub name: String,
-    /// Who it is, as far as the master can tell; for people to read too.
-    pub identity: Arc<str>,
+    /// By what it is known when it comes again.
+    pub identity: Identity,
+    /// The same for people to read: its name and address, or its certificate.
+    pub who: Arc<str>,
     /// Jobs that it computes at a time.
     pub threads: u32,
     /// Memory that it may take, bytes.
@@ -32,6 +39,8 @@ pub struct WorkerCounts {
     pub lost: u64,
     /// Since it was last heard of.
     pub silent: Duration,
+    /// Memory that the smallest block needs of it, bytes, where it has less: it is idle for that.
+    pub too_small_for: Option<u64>,
 }
 
 #[derive(Debug)]
@@ -41,8 +50,8 @@ pub(super) struct Worker {
     pub(super) heard: Time,
     /// Leases that are not lost.
     pub(super) leases: BTreeSet<Id>,
-    /// How often it failed a job of a solve.
-    pub(super) failures: BTreeMap<(Id, usize), u32>,
+    /// The memory that it was told to lack, bytes.
+    pub(super) told: Option<u64>,
     pub(super) counts: Done,
 }
 
@@ -58,7 +67,7 @@ impl Worker {
             facts,
             heard: now,
             leases: BTreeSet::new(),
-            failures: BTreeMap::new(),
+            told: None,
             counts: Done::default(),
         }
     }
@@ -68,13 +77,21 @@ impl Worker {
         2 * self.facts.threads as usize
     }
 
-    pub(super) fn counts(&self, now: Time) -> WorkerCounts {
+    /// As many as that, once it has shown that it computes.
+    pub(super) fn may_lease(&self) -> bool {
+        let earned =
+            LEASES_AT_FIRST.saturating_add(LEASES_A_RESULT.saturating_mul(self.counts.done));
+        (self.leases.len() as u64) < earned
+    }
+
+    pub(super) fn counts(&self, now: Time, too_small_for: Option<u64>) -> WorkerCounts {
         WorkerCounts {
             facts: self.facts.clone(),
             leased: self.leases.len(),
             done: self.counts.done,
             lost: self.counts.lost,
             silent: now.saturating_sub(self.heard),
+            too_small_for,
         }
     }
 }

@@ -2,14 +2,15 @@
 
 use std::collections::BTreeSet;
 use std::fs;
-use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use nestrad_common::panics;
 use nestrad_engine::exchange::Origin;
 use nestrad_kernel::PackedRows;
 use nestrad_kernel::rows::Counts;
-use redb::{Database, DatabaseError, ReadableDatabase, ReadableTable, Table, TableDefinition};
+use redb::{Database, ReadableDatabase, ReadableTable, Table, TableDefinition};
 
 use super::{Key, Written};
 
@@ -33,7 +34,7 @@ const CACHE_BYTES: usize = 16 << 20;
 type Kept = (Key, Arc<PackedRows>, Option<Origin>);
 
 pub(super) struct File {
-    database: Database,
+    database: Guarded,
     path: PathBuf,
     /// Of all results.
     bytes: u64,
@@ -51,54 +52,89 @@ const LEAST_BYTES: u64 = 2 << 20;
 
 pub(super) enum FileError {
     InUse,
-    Other(String),
+    /// The disk is full, may not be written to, or fails: the file may be whole.
+    Disk(String),
+    /// What is in the file is not what was written.
+    Broken(String),
 }
 
 impl From<redb::Error> for FileError {
     fn from(error: redb::Error) -> Self {
-        Self::Other(error.to_string())
+        match error {
+            redb::Error::DatabaseAlreadyOpen => Self::InUse,
+            redb::Error::Io(error) => match error.kind() {
+                // what redb says of a file that is none of its own, or ends too soon
+                ErrorKind::InvalidData => Self::Broken("the file is no store".to_owned()),
+                ErrorKind::UnexpectedEof => Self::Broken("the file is broken".to_owned()),
+                _ => Self::Disk(error.to_string()),
+            },
+            redb::Error::PreviousIo => Self::Disk("the disk failed before".to_owned()),
+            error => Self::Broken(error.to_string()),
+        }
     }
 }
 
-/// A library that meets bytes it did not write may panic: that is a fault of the file.
+/// A library that meets bytes it did not write may panic: that is a fault of the file, and what the panic says is
+/// shown to nobody.
 fn guarded<T>(what: impl FnOnce() -> Result<T, redb::Error>) -> Result<T, FileError> {
-    catch_unwind(AssertUnwindSafe(what))
-        .unwrap_or_else(|_| Err(redb::Error::Corrupted("the file is broken".to_owned())))
-        .map_err(FileError::from)
+    match panics::caught_silently(what) {
+        Ok(done) => done.map_err(FileError::from),
+        Err(_) => Err(FileError::Broken("the file is broken".to_owned())),
+    }
+}
+
+/// A database that is closed as everything else is done with it.
+struct Guarded(Option<Database>);
+
+impl Drop for Guarded {
+    fn drop(&mut self) {
+        let database = self.0.take();
+        // what cannot be closed well is repaired when it is opened
+        let _ = guarded(|| {
+            drop(database);
+            Ok(())
+        });
+    }
+}
+
+impl Guarded {
+    fn get(&self) -> Result<&Database, redb::Error> {
+        self.0.as_ref().ok_or(redb::Error::DatabaseClosed)
+    }
+
+    fn get_mut(&mut self) -> Result<&mut Database, redb::Error> {
+        self.0.as_mut().ok_or(redb::Error::DatabaseClosed)
+    }
 }
 
 impl File {
     pub(super) fn open(path: &Path, most_bytes: u64) -> Result<Self, FileError> {
-        let opened = catch_unwind(|| Database::builder().set_cache_size(CACHE_BYTES).create(path));
-        let database = match opened {
-            Ok(Ok(database)) => database,
-            Ok(Err(DatabaseError::DatabaseAlreadyOpen)) => return Err(FileError::InUse),
-            Ok(Err(error)) => return Err(FileError::Other(error.to_string())),
-            Err(_) => return Err(FileError::Other("the file is broken".to_owned())),
+        let mut builder = Database::builder();
+        let database = guarded(|| Ok(builder.set_cache_size(CACHE_BYTES).create(path)?))?;
+        let mut file = Self {
+            database: Guarded(Some(database)),
+            path: path.to_owned(),
+            bytes: 0,
+            most_bytes,
+            next: 0,
         };
-        guarded(|| {
-            let begun = database.begin_write()?;
+        (file.bytes, file.next) = guarded(|| {
+            let begun = file.database.get()?.begin_write()?;
             let (mut bytes, mut next) = (0, 0);
             {
                 begun.open_table(RESULTS)?;
                 begun.open_table(ORIGINS)?;
                 for entry in begun.open_table(ORDER)?.iter()? {
                     let (number, of) = entry?;
-                    bytes += of.value().1;
-                    next = number.value() + 1;
+                    bytes = of.value().1.saturating_add(bytes);
+                    next = number.value().saturating_add(1);
                 }
             }
             begun.commit()?;
             Ok((bytes, next))
-        })
-        .map(|(bytes, next)| Self {
-            database,
-            path: path.to_owned(),
-            bytes,
-            most_bytes,
-            next,
-        })
-        .and_then(|mut file| file.bound().map(|()| file))
+        })?;
+        file.bound()?;
+        Ok(file)
     }
 
     /// Length of the file.
@@ -122,7 +158,7 @@ impl File {
         while self.length() > at_rest {
             let database = &mut self.database;
             guarded(|| {
-                while database.compact()? {}
+                while database.get_mut()?.compact()? {}
                 Ok(())
             })?;
             if self.length() <= at_rest || self.bytes == 0 {
@@ -137,7 +173,7 @@ impl File {
     fn drop_to(&mut self, most: u64) -> Result<(), FileError> {
         let mut bytes = self.bytes;
         self.bytes = guarded(|| {
-            let begun = self.database.begin_write()?;
+            let begun = self.database.get()?.begin_write()?;
             {
                 let mut by_name = begun.open_table(RESULTS)?;
                 let mut order = begun.open_table(ORDER)?;
@@ -157,7 +193,7 @@ impl File {
     /// The result of that name; nothing where it is not whole.
     pub(super) fn get(&self, key: &Key) -> Result<Option<PackedRows>, String> {
         let read = guarded(|| {
-            let begun = self.database.begin_read()?;
+            let begun = self.database.get()?.begin_read()?;
             let found = begun.open_table(RESULTS)?.get(&key[..])?;
             Ok(found.and_then(|found| unpack(found.value())))
         });
@@ -167,7 +203,7 @@ impl File {
     /// Whether there is a result of that name.
     pub(super) fn has(&self, key: &Key) -> bool {
         let found = guarded(|| {
-            let begun = self.database.begin_read()?;
+            let begun = self.database.get()?.begin_read()?;
             Ok(begun.open_table(RESULTS)?.get(&key[..])?.is_some())
         });
         found.unwrap_or(false)
@@ -275,7 +311,7 @@ impl File {
         let most = self.most_results();
         let written = guarded(|| {
             let (mut bytes, mut next) = (self.bytes, self.next);
-            let begun = self.database.begin_write()?;
+            let begun = self.database.get()?.begin_write()?;
             {
                 let mut by_name = begun.open_table(RESULTS)?;
                 let mut order = begun.open_table(ORDER)?;
@@ -316,12 +352,14 @@ fn drop_oldest(
 ) -> Result<(), redb::Error> {
     while *bytes > most {
         let Some((_, oldest)) = order.pop_first()? else {
+            // a file that is damaged may count wrongly
+            *bytes = 0;
             break;
         };
         let (name, size) = oldest.value();
         by_name.remove(name)?;
         origins.remove(name)?;
-        *bytes -= size;
+        *bytes = bytes.saturating_sub(size);
     }
     Ok(())
 }
@@ -330,7 +368,7 @@ impl FileError {
     fn text(self) -> String {
         match self {
             Self::InUse => "in use".to_owned(),
-            Self::Other(reason) => reason,
+            Self::Disk(reason) | Self::Broken(reason) => reason,
         }
     }
 }

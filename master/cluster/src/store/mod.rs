@@ -16,6 +16,7 @@ use std::sync::mpsc::{self, Receiver, SyncSender};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::{self, JoinHandle};
 
+use nestrad_common::panics;
 use nestrad_engine::exchange::Origin;
 use nestrad_kernel::PackedRows;
 use thiserror::Error;
@@ -73,6 +74,12 @@ pub enum StoreError {
         /// What the system says.
         source: io::Error,
     },
+    /// What is named is something else than a folder.
+    #[error("{}: expected a folder, found a file", folder.display())]
+    NoFolder {
+        /// What was named.
+        folder: PathBuf,
+    },
     /// Another master has it.
     #[error("{}: is in use by another nestrad", file.display())]
     InUse {
@@ -94,23 +101,29 @@ pub enum StoreError {
 
 impl Store {
     /// Opens the store in a folder, which is made if there is none. It holds at most so many bytes of
-    /// results; the oldest go first. A file that cannot be read is put aside.
+    /// results; the oldest go first. A file that is broken is put aside; one that is whole, on a disk that is full or
+    /// takes nothing, stays.
     pub fn open(folder: &Path, most_bytes: u64) -> Result<Self, StoreError> {
-        fs::create_dir_all(folder).map_err(|source| StoreError::Folder {
-            folder: folder.to_owned(),
-            source,
+        fs::create_dir_all(folder).map_err(|source| match source.kind() {
+            io::ErrorKind::AlreadyExists | io::ErrorKind::NotADirectory => StoreError::NoFolder {
+                folder: folder.to_owned(),
+            },
+            _ => StoreError::Folder {
+                folder: folder.to_owned(),
+                source,
+            },
         })?;
         let path = folder.join("results.redb");
         let refused = |error: FileError| match error {
             FileError::InUse => StoreError::InUse { file: path.clone() },
-            FileError::Other(reason) => StoreError::File {
+            FileError::Disk(reason) | FileError::Broken(reason) => StoreError::File {
                 file: path.clone(),
                 reason,
             },
         };
         let mut warned = None;
         let file = match File::open(&path, most_bytes) {
-            Err(FileError::Other(reason)) => {
+            Err(FileError::Broken(reason)) => {
                 let aside = path.with_extension("corrupt");
                 warned = Some(format!(
                     "{}: {reason}; the file is renamed to {}",
@@ -131,7 +144,15 @@ impl Store {
         let (shared, told) = (file.clone(), warning.clone());
         let writer = thread::Builder::new()
             .name("store".to_owned())
-            .spawn(move || write(&receiver, &shared, &told))
+            .spawn(move || {
+                let written = panics::caught(|| write(&receiver, &shared, &told));
+                if let Err(panic) = written {
+                    tell(
+                        &told,
+                        &format!("results are no longer kept: internal fault: {panic}"),
+                    );
+                }
+            })
             .map_err(StoreError::Thread)?;
         Ok(Self(Arc::new(Shared {
             file,

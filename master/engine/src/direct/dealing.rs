@@ -107,6 +107,14 @@ impl Beam<'_> {
         areas.probed_m2 = Some([projected_m2, lit_m2, shown_m2]);
     }
 
+    fn face(&self, lit: &Lit, part: f64) -> LitFace {
+        LitFace {
+            row: (2 * lit.element + usize::from(!lit.upper)) as u32,
+            variance: (lit.variance_m4 / (self.line_area_m2 * self.line_area_m2)) as f32,
+            part,
+        }
+    }
+
     fn unsure(&self, lit: &Lit, variance_m4: f64) -> Unsure {
         let t = self.frame.triangle_of_element[lit.element] as usize;
         Unsure {
@@ -161,12 +169,7 @@ impl Beam<'_> {
             } else {
                 0.0
             };
-            areas.faces.push(LitFace {
-                element: lit.element as u32,
-                upper: lit.upper,
-                part,
-                variance_m4: lit.variance_m4,
-            });
+            areas.faces.push(self.face(lit, part));
         }
         self.add_unmet(thin, scratch, areas);
     }
@@ -211,12 +214,7 @@ impl Beam<'_> {
             } else if unmet {
                 areas.unsure.push(self.unsure(&lit, lit.variance_m4));
             }
-            areas.faces.push(LitFace {
-                element: e as u32,
-                upper: lit.upper,
-                part: 0.0,
-                variance_m4: lit.variance_m4,
-            });
+            areas.faces.push(self.face(&lit, 0.0));
         }
     }
 }

@@ -37,15 +37,15 @@ pub(super) struct LitAreas {
     pub(super) probed_m2: Option<[f64; 3]>,
 }
 
-/// A face that is lit.
+/// A face that is lit. There are as many as a canopy has, for each direction that is kept: they are small.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct LitFace {
-    pub(super) element: u32,
-    pub(super) upper: bool,
+    /// Number of the row.
+    pub(super) row: u32,
+    /// Variance of the lit area, in squares of the cross-section of a line.
+    pub(super) variance: f32,
     /// Lit area perpendicular to the source, over the area of the face.
     pub(super) part: f64,
-    /// Variance of the lit area, m⁴.
-    pub(super) variance_m4: f64,
 }
 
 /// A soil cell that is lit.
@@ -97,6 +97,30 @@ pub(super) struct Lit {
     /// Perpendicular to the source.
     pub(super) area_m2: f64,
     pub(super) variance_m4: f64,
+}
+
+impl LitAreas {
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> u64 {
+        let of = |list: usize, item: usize| (list * item) as u64;
+        size_of::<Self>() as u64
+            + of(self.faces.capacity(), size_of::<LitFace>())
+            + of(self.soil.capacity(), size_of::<LitCell>())
+            + of(self.shades.capacity(), size_of::<Shade>())
+            + of(self.outlines.capacity(), size_of::<Outline>())
+            + of(self.scene.capacity(), size_of::<Outline>())
+            + of(self.unsure.capacity(), size_of::<Unsure>())
+    }
+
+    /// Without room that is not used.
+    pub(super) fn shrink(&mut self) {
+        self.faces.shrink_to_fit();
+        self.soil.shrink_to_fit();
+        self.shades.shrink_to_fit();
+        self.outlines.shrink_to_fit();
+        self.scene.shrink_to_fit();
+        self.unsure.shrink_to_fit();
+    }
 }
 
 impl Scratch {

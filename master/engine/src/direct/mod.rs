@@ -12,6 +12,7 @@ mod areas;
 mod classes;
 mod dealing;
 mod effort;
+mod kept;
 mod lit_areas;
 mod outlines;
 mod probe;
@@ -29,6 +30,7 @@ use rand::RngExt;
 use rayon::prelude::*;
 
 pub use effort::spread_effort;
+pub use kept::KeptDirections;
 pub use shares::ShareVariances;
 
 use crate::frame::Frame;
@@ -36,7 +38,7 @@ use crate::stop::Stopped;
 use areas::Areas;
 use classes::{Classes, Face};
 use lit_areas::{LitAreas, Scratch};
-use probe::Probe;
+use probe::{Probe, Thin};
 use projection::Projection;
 
 /// Uncollided light on everything that has a row.
@@ -70,19 +72,38 @@ pub struct Direct {
 
 /// Sources are worked off in this many groups, an even number, each in order, which are then added in order: so the
 /// result does not depend on the number of threads.
-const GROUPS: usize = 8;
+pub(crate) const GROUPS: usize = 8;
 
 /// Projects every source on a frame, with optics in its order. `line_area_m2` holds, per source, the cross-section
 /// of a line (m²); `step` is asked before each of them.
 pub fn direct_light(
     frame: &Frame,
     optics: &Optics,
-    (sources, line_area_m2): (&Sources, &[f64]),
+    projections: (&Sources, &[f64]),
     seed: u64,
     step: impl Fn() -> Result<(), Stopped> + Sync,
 ) -> Result<Direct, Stopped> {
+    let kept = KeptDirections::default();
+    direct_light_keeping(frame, optics, projections, seed, &kept, step)
+}
+
+/// The same; what a direction lights is projected once, and kept for this frame if there is room.
+pub fn direct_light_keeping(
+    frame: &Frame,
+    optics: &Optics,
+    (sources, line_area_m2): (&Sources, &[f64]),
+    seed: u64,
+    kept: &KeptDirections,
+    step: impl Fn() -> Result<(), Stopped> + Sync,
+) -> Result<Direct, Stopped> {
     let (areas, classes) = (Areas::of(frame), Classes::of(frame));
-    let probe = Probe::new(frame, &areas, (&sources.list, line_area_m2), seed);
+    let thin = |source: &Source, line_area_m2: f64| {
+        kept.thin(-source.direction, line_area_m2, || {
+            Thin::of(frame, &areas, -source.direction, line_area_m2).count()
+        })
+    };
+    let probe = Probe::new((&sources.list, line_area_m2), thin, seed);
+    kept.next_light();
     let parts: Result<Vec<Direct>, Stopped> = groups(sources)
         .into_par_iter()
         .map(|group| {
@@ -98,8 +119,9 @@ pub fn direct_light(
                     line_area_m2: line_area_m2[k],
                     random: rng.random(),
                 };
-                let lit =
-                    projection.lit_areas(frame, (&areas, &classes), probe.as_ref(), &mut scratch);
+                let lit = kept.lit_areas(&projection, seed, probe.is_some(), || {
+                    projection.lit_areas(frame, (&areas, &classes), probe.as_ref(), &mut scratch)
+                });
                 part.add(frame, optics, &lit, source);
             }
             Ok(part)
@@ -217,13 +239,14 @@ impl Direct {
     ) {
         let (bands, band) = (optics.len(), &optics.bands[b]);
         for face in &lit.faces {
-            let element = face.element as usize;
-            let row = 2 * element + usize::from(!face.upper);
+            let row = face.row as usize;
+            let (element, upper) = (row / 2, row.is_multiple_of(2));
             self.irradiance_W_m2[row * bands + b] += intensity * face.part;
             let t = frame.triangle_of_element[element] as usize;
             let material = &band.materials[frame.material[t] as usize];
-            let absorbed = intensity * material.absorptance(face.upper);
-            self.element_variance_W2[element * bands + b] += absorbed * absorbed * face.variance_m4;
+            let of_a_line = intensity * material.absorptance(upper) * lit.line_area_m2;
+            self.element_variance_W2[element * bands + b] +=
+                of_a_line * of_a_line * f64::from(face.variance);
         }
         for lit_cell in &lit.soil {
             let row = frame.ends.soil(lit_cell.cell) as usize;

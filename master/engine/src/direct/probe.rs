@@ -1,5 +1,7 @@
 //! Rays towards a source, from organs that its lattice meets too seldom to say anything of them.
 
+use std::sync::OnceLock;
+
 use glam::DVec3;
 use nestrad_common::geometry;
 use nestrad_common::light::Source;
@@ -25,7 +27,8 @@ const MOST_RAYS: f64 = 2e5;
 
 /// The scene as rays see it.
 pub(super) struct Probe {
-    tracer: Tracer,
+    /// Made when the first ray is cast: directions that are kept need none.
+    tracer: OnceLock<Tracer>,
     seed: u64,
 }
 
@@ -59,6 +62,11 @@ impl Thin {
         self.organ.contains(&true)
     }
 
+    /// How many there are.
+    pub(super) fn count(&self) -> usize {
+        self.organ.iter().filter(|&&thin| thin).count()
+    }
+
     /// Leaves all of them to the lattice.
     pub(super) fn forget(&mut self) {
         self.organ.fill(false);
@@ -67,21 +75,17 @@ impl Thin {
 
 impl Probe {
     /// For organs that are too small for the lattices of these cross-sections (m², per source), if there
-    /// are any.
+    /// are any; `thin` counts them.
     pub(super) fn new(
-        frame: &Frame,
-        areas: &Areas,
         (sources, line_area_m2): (&[Source], &[f64]),
+        thin: impl Fn(&Source, f64) -> usize + Sync,
         seed: u64,
     ) -> Option<Self> {
-        let thin = |k: usize| {
-            let thin = Thin::of(frame, areas, -sources[k].direction, line_area_m2[k]);
-            thin.organ.iter().filter(|&&thin| thin).count()
-        };
+        let thin = |k: usize| thin(&sources[k], line_area_m2[k]);
         let organs: usize = (0..sources.len()).into_par_iter().map(thin).sum();
         let few = organs > 0 && organs as f64 * RAYS <= MOST_RAYS;
         few.then(|| Self {
-            tracer: Tracer::new(frame.block()),
+            tracer: OnceLock::new(),
             seed,
         })
     }
@@ -109,10 +113,10 @@ impl Probe {
         let corners = piece_corners(divisions, piece);
         let index = (source as u64 + 1) << 32 | element as u64;
         let mut rng = stream(self.seed, Purpose::Direct, index);
+        let tracer = self.tracer.get_or_init(|| Tracer::new(frame.block()));
         let free = (0..rays).filter(|_| {
             let origin = geometry::point_within(&triangle, &corners, [rng.random(), rng.random()]);
-            self.tracer
-                .sees_sky(frame.block(), (t, element as u32), origin, towards)
+            tracer.sees_sky(frame.block(), (t, element as u32), origin, towards)
         });
         free.count() as u32
     }

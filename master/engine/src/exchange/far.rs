@@ -61,12 +61,17 @@ impl FarRows {
         let half = |h: usize| {
             let batches = h * HALF_BATCHES..(h + 1) * HALF_BATCHES;
             let batches: Vec<BatchRows> = batches.map(batch).collect::<Result<_, _>>()?;
-            Ok::<_, ExchangeError>(HalfRows::join(&batches))
+            Ok::<_, ExchangeError>(HalfRows::join(batches))
         };
         Ok(Self {
             halves: [half(0)?, half(1)?],
             far_ends: frame.ends.far_ends,
         })
+    }
+
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        self.halves.iter().map(HalfRows::bytes).sum()
     }
 
     /// The row of what leaves the scene that way.

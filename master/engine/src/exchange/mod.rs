@@ -68,16 +68,18 @@ impl Exchange {
             .ok_or_else(|| ExchangeError::Failed("jobs without result".to_owned()))
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        self.halves.iter().map(HalfRows::bytes).sum()
+    }
+
     /// Joins all batches.
     fn of_batches(mut batches: Vec<BatchRows>, counts: Counts, jobs: JobCounts) -> Self {
-        let mut halves = [HalfRows::default(), HalfRows::default()];
         // each half's batches are freed before the other half is joined
         let second = batches.split_off(batches.len() / 2);
-        halves[0] = HalfRows::join(&batches);
-        drop(batches);
-        halves[1] = HalfRows::join(&second);
+        let first = HalfRows::join(batches);
         Self {
-            halves,
+            halves: [first, HalfRows::join(second)],
             counts,
             jobs,
         }

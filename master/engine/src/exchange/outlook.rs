@@ -70,6 +70,14 @@ impl Outlook {
         }
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let pairs = [&self.weight, &self.to_sky, &self.to_void];
+        let lists = pairs.into_iter().flatten();
+        let all = lists.chain([&self.exposed, &self.outer_soil_m2]);
+        all.map(|list| size_of_val(&list[..]) as u64).sum()
+    }
+
     /// The part of what a row sends out that leaves downwards or to the soil beyond the map, by the lines of a half.
     pub fn to_void(&self, half: usize, row: usize) -> f64 {
         self.to_void[half].get(row).copied().unwrap_or(0.0)

@@ -10,6 +10,13 @@ use super::sampling::Sampling;
 use super::split::demand;
 use crate::frame::Frame;
 
+/// A block is not cut further where it has so many times as many triangles as those that it owns: smaller blocks would
+/// make more work for everybody than a worker that is too small for this one can do.
+const MOST_AROUND: usize = 16;
+
+/// Blocks that own fewer triangles than this are small by any measure.
+const LEAST_OWNED: usize = 64;
+
 /// The smallest of the workers that are to compute a solve.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SmallestWorker {
@@ -58,6 +65,10 @@ pub fn partition(
         if needed <= worker.memory_bytes {
             blocks.push(block);
             continue;
+        }
+        // what is around would be traced again and again
+        if part.around.len() > MOST_AROUND * part.owned.len().max(LEAST_OWNED) {
+            return Err(too_large(needed));
         }
         let [a, b] = map.halves(part);
         if a.is_empty() || b.is_empty() {

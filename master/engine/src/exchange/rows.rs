@@ -4,6 +4,8 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::heap;
+
 /// The rows of one batch.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct BatchRows {
@@ -92,11 +94,19 @@ impl BatchEnds {
 /// Rows that are joined as one task.
 const JOINED_AT_ONCE: usize = 4096;
 
+/// The first numbers of a slice, which is left without them.
+fn take_front<'a>(slice: &mut &'a mut [u32], count: usize) -> &'a mut [u32] {
+    let (front, rest) = std::mem::take(slice).split_at_mut(count);
+    *slice = rest;
+    front
+}
+
 impl HalfRows {
-    /// Joins the batches of a half.
-    pub fn join(batches: &[BatchRows]) -> Self {
+    /// Joins the batches of a half, which give their memory back as they are read: entries are never there twice.
+    pub fn join(mut batches: Vec<BatchRows>) -> Self {
+        let count = batches.len();
         let rows = batches.first().map_or(0, |b| b.start.len() - 1);
-        let batch_end = BatchEnds::of(batches, rows);
+        let batch_end = BatchEnds::of(&batches, rows);
         let mut start = Vec::with_capacity(rows + 1);
         start.push(0);
         let mut total = 0;
@@ -104,27 +114,36 @@ impl HalfRows {
             total += batches.iter().map(|b| b.row(row).len()).sum::<usize>() as u64;
             start.push(total);
         }
+        // memory that the system gives when it is written to
         let mut ends = vec![0; total as usize];
+        let (starts, mut left): (Vec<&[u32]>, Vec<&mut [u32]>) = batches
+            .iter_mut()
+            .map(|b| (&b.start[..], &mut b.ends[..]))
+            .unzip();
         let mut parts = Vec::with_capacity(rows.div_ceil(JOINED_AT_ONCE));
         let mut rest = &mut ends[..];
         for first in (0..rows).step_by(JOINED_AT_ONCE) {
             let last = (first + JOINED_AT_ONCE).min(rows);
-            let (part, left) = rest.split_at_mut((start[last] - start[first]) as usize);
-            parts.push((first..last, part));
-            rest = left;
+            let into = take_front(&mut rest, (start[last] - start[first]) as usize);
+            let from: Vec<&mut [u32]> = starts
+                .iter()
+                .zip(&mut left)
+                .map(|(start, left)| take_front(left, (start[last] - start[first]) as usize))
+                .collect();
+            parts.push((first..last, into, from));
         }
-        parts.into_par_iter().for_each(|(rows, mut part)| {
+        parts.into_par_iter().for_each(|(rows, mut part, from)| {
+            let first = rows.start;
             for row in rows {
-                for batch in batches {
-                    let entries = batch.row(row);
-                    let (to, left) = part.split_at_mut(entries.len());
-                    to.copy_from_slice(entries);
-                    part = left;
+                for (start, from) in starts.iter().zip(&from) {
+                    let [begin, end] = [row, row + 1].map(|r| (start[r] - start[first]) as usize);
+                    take_front(&mut part, end - begin).copy_from_slice(&from[begin..end]);
                 }
             }
+            from.into_iter().for_each(heap::forget);
         });
         Self {
-            batches: batches.len(),
+            batches: count,
             start,
             batch_end,
             ends,
@@ -161,6 +180,15 @@ impl HalfRows {
         })
     }
 
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let of_places = match &self.batch_end {
+            BatchEnds::Short(ends) => size_of_val(&ends[..]),
+            BatchEnds::Long(ends) => size_of_val(&ends[..]),
+        };
+        (of_places + size_of_val(&self.start[..]) + size_of_val(&self.ends[..])) as u64
+    }
+
     /// Number of entries of all rows.
     pub fn entries(&self) -> u64 {
         self.ends.len() as u64
@@ -178,7 +206,7 @@ mod tests {
                 BatchRows::new(&[2, long], (0..2 + long).collect()),
                 BatchRows::new(&[0, 1], vec![7]),
             ];
-            let joined = HalfRows::join(&batches);
+            let joined = HalfRows::join(batches.to_vec());
             assert_eq!(
                 joined.batch_end,
                 match long {

@@ -57,13 +57,16 @@ impl Sampling {
 
     /// Lines through an extent, in all directions together.
     pub fn lines(&self, extent: &Extent) -> f64 {
+        (0..self.batches).map(|b| self.lines_of(b, extent)).sum()
+    }
+
+    /// The same of one batch; others have about as many.
+    pub fn lines_of(&self, batch: u32, extent: &Extent) -> f64 {
         let lattice = |lines: Lines| {
             Lattice::new(lines.direction, extent, lines.line_area_m2, lines.random).lines()
         };
-        (0..self.batches)
-            .flat_map(|b| self.batch(b).lines)
-            .map(|lines| lattice(lines) as f64)
-            .sum()
+        let lines = self.batch(batch).lines.into_iter();
+        lines.map(|lines| lattice(lines) as f64).sum()
     }
 
     /// The longest line through a layer of that height, metres; infinite with rays.

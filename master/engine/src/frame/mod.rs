@@ -125,6 +125,15 @@ impl Frame {
         })
     }
 
+    /// Bytes that it takes, about.
+    pub fn bytes(&self) -> u64 {
+        /// Vertices, numbers, flags.
+        const OF_A_TRIANGLE: u64 = 100;
+        /// Area and triangle.
+        const OF_AN_ELEMENT: u64 = 12;
+        OF_A_TRIANGLE * self.organ.len() as u64 + OF_AN_ELEMENT * self.area_m2.len() as u64
+    }
+
     /// The whole scene as one block.
     pub fn block(&self) -> &Block {
         &self.block

@@ -22,6 +22,9 @@ pub struct Aims {
     /// Of the size of soil cells.
     #[serde(default = "default_soil_percent")]
     pub soil_percent: f64,
+    /// Whether lines are thinned where a single set of directions is not coarse enough: a limit is short.
+    #[serde(default)]
+    pub thin: bool,
 }
 
 /// What soil cells were planned for before they were among the aims.
@@ -46,6 +49,7 @@ impl Aims {
                 .min((DEFAULT_ACCURACY_PERCENT * accuracy_percent).sqrt()),
             // large cells save next to nothing
             soil_percent: accuracy_percent.min(DEFAULT_ACCURACY_PERCENT),
+            thin: false,
         }
     }
 
@@ -58,6 +62,7 @@ impl Aims {
             sky_percent: asked.sky_percent.max(1.0),
             elements_percent: asked.elements_percent.max(2.0),
             soil_percent: DEFAULT_ACCURACY_PERCENT,
+            thin: false,
         }
     }
 
@@ -80,6 +85,41 @@ impl Aims {
             elements_percent: on_the_way(self.elements_percent, finer.elements_percent),
             soil_percent: on_the_way(self.soil_percent, finer.soil_percent),
             ..*finer
+        }
+    }
+
+    /// Whether others ask for nothing else of how a canopy is traced.
+    pub fn trace_as(&self, other: &Self) -> bool {
+        let traced = |aims: &Self| {
+            [
+                aims.exchange_percent,
+                aims.elements_percent,
+                aims.soil_percent,
+            ]
+        };
+        traced(self) == traced(other)
+    }
+
+    /// The same with what takes memory coarser by a factor, and nothing else: one way down for all who ask for more
+    /// than there is memory for, so that who asks for more is not given less.
+    #[must_use]
+    pub fn coarser(&self, factor: f64) -> Self {
+        Self {
+            exchange_percent: self.exchange_percent * factor,
+            elements_percent: self.elements_percent * factor,
+            soil_percent: self.soil_percent * factor,
+            thin: true,
+            ..*self
+        }
+    }
+
+    /// The same with all that takes time coarser by a factor.
+    #[must_use]
+    pub fn quicker(&self, factor: f64) -> Self {
+        Self {
+            direct_percent: self.direct_percent * factor,
+            sky_percent: self.sky_percent * factor,
+            ..self.coarser(factor)
         }
     }
 

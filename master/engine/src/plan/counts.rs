@@ -32,6 +32,27 @@ pub struct WorkCounts {
 impl WorkCounts {
     /// Of a plan for a lit canopy.
     pub fn of(lit: &LitCanopy, plan: &Plan) -> Self {
+        let mut counts = Self::without_entries(lit, plan);
+        let Some(sampling) = &plan.trace.sampling else {
+            return counts;
+        };
+        // each hit is seen from both sides, each line has two ends
+        let hits = 0.5 * counts.directions * plan.scale.area_m2 / sampling.line_area_m2;
+        let lines = sampling.lines(&extent_of(lit.canopy));
+        let rays = f64::from(sampling.batches) * sampling.least_samples * counts.rows
+            / HALF_BATCHES as f64;
+        counts.entries = 2.0 * hits
+            + lines
+            + if sampling.sets_per_batch == 0 {
+                rays
+            } else {
+                0.1 * rays
+            };
+        counts
+    }
+
+    /// The same without entries, which take long to count where there are many directions.
+    pub(crate) fn without_entries(lit: &LitCanopy, plan: &Plan) -> Self {
         let LitCanopy {
             canopy, sources, ..
         } = *lit;
@@ -44,35 +65,20 @@ impl WorkCounts {
         let rows = 2.0 * elements + soil_cells;
         let areas = plan.light.line_areas_m2(&extent, sources);
         let direct = sources.list.iter().zip(areas);
-        let mut counts = Self {
+        let directions = plan.trace.sampling.map_or(0.0, |sampling| {
+            f64::from(sampling.batches * sampling.sets_per_batch * sampling.axes.count())
+        });
+        Self {
             triangles: canopy.len() as f64,
             elements,
             soil_cells,
             rows,
-            directions: 0.0,
+            directions,
             entries: 0.0,
             direct_lines: direct
                 .map(|(source, area)| extent.lines_through(-source.direction, area))
                 .sum(),
             sky_directions: sources.sky_directions as f64,
-        };
-        let Some(sampling) = &plan.trace.sampling else {
-            return counts;
-        };
-        counts.directions =
-            f64::from(sampling.batches * sampling.sets_per_batch * sampling.axes.count());
-        // each hit is seen from both sides, each line has two ends
-        let hits = 0.5 * counts.directions * plan.scale.area_m2 / sampling.line_area_m2;
-        let lines = sampling.lines(&extent);
-        let rays =
-            f64::from(sampling.batches) * sampling.least_samples * rows / HALF_BATCHES as f64;
-        counts.entries = 2.0 * hits
-            + lines
-            + if sampling.sets_per_batch == 0 {
-                rays
-            } else {
-                0.1 * rays
-            };
-        counts
+        }
     }
 }

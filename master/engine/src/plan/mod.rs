@@ -5,7 +5,9 @@ mod aims;
 mod counts;
 mod density;
 mod elements;
+mod entries;
 mod finest;
+mod fitting;
 mod limits;
 mod memory;
 mod reasons;
@@ -17,7 +19,7 @@ use std::sync::Arc;
 
 use nestrad_common::canopy::Canopy;
 use nestrad_common::light::Sources;
-use nestrad_common::options::Diameter;
+use nestrad_common::options::{DEFAULT_MEMORY_GIB, Diameter};
 use nestrad_kernel::elements::Elements;
 use nestrad_kernel::far_grid::{Levels, SharedFarGrid};
 use nestrad_kernel::lattice::Extent;
@@ -31,6 +33,7 @@ use crate::lit_canopy::LitCanopy;
 use crate::solver::Tolerance;
 pub use aims::Aims;
 pub use counts::WorkCounts;
+pub use entries::Entries;
 pub use finest::AtFinest;
 pub use limits::LEAST_ACCURACY_PERCENT;
 pub use memory::Memory;
@@ -74,7 +77,7 @@ impl Default for Settings {
             accuracy_percent: DEFAULT_ACCURACY_PERCENT,
             in_rounds: false,
             budget_s: None,
-            memory_GiB: 8.0,
+            memory_GiB: DEFAULT_MEMORY_GIB,
             seed: 1,
             estimator: Estimator::default(),
         }
@@ -104,7 +107,7 @@ pub struct Plan {
 }
 
 /// How a canopy is traced.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct TracePlan {
     /// Longest edge of an element, metres.
     pub max_edge_m: f64,
@@ -116,6 +119,9 @@ pub struct TracePlan {
     pub far_field: Option<FarPlan>,
     /// Sampling of the exchange; `None` when nothing scatters.
     pub sampling: Option<Sampling>,
+    /// Whether memory allows no direct light while rows are traced elsewhere.
+    #[serde(skip)]
+    pub in_turn: bool,
 }
 
 /// How finely the far field is resolved.
@@ -175,14 +181,35 @@ impl TracePlan {
 pub enum PlanError {
     /// It does not fit.
     #[error(
-        "the solve needs about {:.2} GiB (scene {:.2}, rows {:.2}, solver {:.2}), the limit is {} GiB: allow more with --memory, or a larger error with --accuracy",
-        .needed.total_GiB(), .needed.scene_GiB, .needed.rows_GiB, .needed.solver_GiB, Short(*.limit_GiB)
+        "the solve needs about {:.2} GiB (program {:.2}, scene {:.2}, rows {:.2}, solver {:.2}), the limit is {} GiB: allow more with --memory",
+        .needed.total_GiB(), .needed.program_GiB, .needed.scene_GiB, .needed.rows_GiB, .needed.solver_GiB,
+        Short(*.limit_GiB)
     )]
     Memory {
         /// What the smallest plan for this accuracy takes.
         needed: Memory,
         /// What the user allows.
         limit_GiB: f64,
+    },
+    /// There is not time enough for any.
+    #[error(
+        "the coarsest solve of this scene takes about {needed_s:.1} s on this machine, the limit is {} s: allow more with --budget", Short(*.limit_s)
+    )]
+    Time {
+        /// What the coarsest plan should take.
+        needed_s: f64,
+        /// What is left of what the user allows.
+        limit_s: f64,
+    },
+    /// There was not time enough for the coarsest.
+    #[error(
+        "--budget is over: the first, coarsest round was not done after {needed_s:.1} s; the limit is {} s: allow more with --budget", Short(*.limit_s)
+    )]
+    Overtime {
+        /// How long it was worked at.
+        needed_s: f64,
+        /// What the user allows.
+        limit_s: f64,
     },
     /// More accuracy than there are directions for.
     #[error("accuracy: expected at least {least} %, found {} %", Short(*.found))]
@@ -257,12 +284,7 @@ impl Plan {
     /// Decides what a lit canopy needs for the accuracy of the settings.
     pub fn new(lit: &LitCanopy, settings: &Settings) -> Result<Self, PlanError> {
         let scale = Scale::of(lit.canopy);
-        let mut aims = Aims::of(settings.accuracy_percent);
-        if settings.in_rounds {
-            aims = elements::fine_enough(aims, settings.accuracy_percent, &scale);
-            aims = sampling::with_a_margin(aims, lit.canopy, &scale);
-        }
-        Self::of_scale(lit, settings, &aims, scale)
+        Self::of_scale(lit, settings, &asked(lit.canopy, settings, &scale), scale)
     }
 
     /// The same with an error to aim at for each part, in place of the accuracy.
@@ -333,6 +355,7 @@ impl Plan {
                 radius_m,
                 far_field: radius_m.map(|_| sampling::far_field(settings, finer)),
                 sampling,
+                in_turn: false,
             },
             light: LightPlan {
                 direct_line_area_m2,
@@ -352,11 +375,29 @@ impl Plan {
         Ok(plan)
     }
 
+    /// The plan for another light of a canopy that was traced by such a plan, for these aims.
+    pub fn of_traced(
+        lit: &LitCanopy,
+        settings: &Settings,
+        (trace, aims): (&TracePlan, &Aims),
+    ) -> Result<Self, PlanError> {
+        let own = Self::aimed(lit, settings, aims)?;
+        let plan = Self {
+            trace: trace.clone(),
+            aims: *aims,
+            ..own
+        };
+        let mut plan = plan.within(lit, settings.memory_GiB)?;
+        plan.reasons = reasons::of(lit, settings, &plan);
+        Ok(plan)
+    }
+
     /// The plan as it is after its fields were changed, with the memory that it takes now, or why there is not
     /// enough of it. Its reasons are gone: they were those of the plan before the change.
     pub fn within(mut self, lit: &LitCanopy, memory_GiB: f64) -> Result<Self, PlanError> {
         limits::check_elements(lit.canopy, self.trace.max_edge_m)?;
         self.memory = Memory::of(lit, &self);
+        self.trace.in_turn = Memory::of_at_once(lit, &self).total_GiB() > memory_GiB;
         self.reasons.clear();
         if self.memory.total_GiB() <= memory_GiB {
             return Ok(self);
@@ -369,8 +410,22 @@ impl Plan {
 
     /// Planning the exchange for a larger error than this makes it no coarser.
     pub fn coarsest_exchange_percent(&self, canopy: &Canopy) -> f64 {
-        sampling::coarsest_percent(canopy, &self.scale)
+        if self.aims.thin {
+            f64::INFINITY
+        } else {
+            sampling::coarsest_percent(canopy, &self.scale)
+        }
     }
+}
+
+/// What is aimed at where nothing stands against it.
+fn asked(canopy: &Canopy, settings: &Settings, scale: &Scale) -> Aims {
+    let aims = Aims::of(settings.accuracy_percent);
+    if !settings.in_rounds {
+        return aims;
+    }
+    let aims = elements::fine_enough(aims, settings.accuracy_percent, scale);
+    sampling::with_a_margin(aims, canopy, scale)
 }
 
 /// An organ of average size is not cut finer than into this many along a side, however small the sphere.

@@ -17,14 +17,34 @@ pub(super) fn of(lit: &LitCanopy, settings: &Settings, plan: &Plan) -> Vec<Strin
     lines.push(faces(lit.canopy));
     lines.push(soil(lit.canopy, plan));
     lines.push(format!(
-        "memory: about {:.2} GiB (scene {:.2}, rows {:.2}, solver {:.2}) of {} GiB allowed",
+        "memory: about {:.2} GiB (program {:.2}, scene {:.2}, rows {:.2}, solver {:.2}) of {} GiB allowed",
         plan.memory.total_GiB(),
+        plan.memory.program_GiB,
         plan.memory.scene_GiB,
         plan.memory.rows_GiB,
         plan.memory.solver_GiB,
         settings.memory_GiB
     ));
+    lines.extend(limits(settings, plan));
     lines
+}
+
+/// What a limit made coarser.
+fn limits(settings: &Settings, plan: &Plan) -> Option<String> {
+    let aims = &plan.aims;
+    let percent = |p: f64| (1e2 * p).round() / 1e2;
+    let limit = match settings.budget_s {
+        Some(s) => format!("--memory {} or --budget {s}", settings.memory_GiB),
+        None => format!("--memory {}", settings.memory_GiB),
+    };
+    plan.is_limited().then(|| {
+        format!(
+            "limit: {limit} allows no finer plan, so it is coarser than was asked for: for an error of {} % by the exchange, {} % by elements, {} % by soil cells",
+            percent(aims.exchange_percent),
+            percent(aims.elements_percent),
+            percent(aims.soil_percent)
+        )
+    })
 }
 
 fn light(lit: &LitCanopy, plan: &Plan) -> String {

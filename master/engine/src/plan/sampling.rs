@@ -46,6 +46,10 @@ const RAYS: f64 = 64.0;
 /// Sets of axes for each batch at the default accuracy, where there are lines enough on an organ.
 const SETS: f64 = 1.9;
 
+/// Lines are not thinned by more than this, and a face has a chance at least of some sample in each half.
+const MOST_THINNED: f64 = 64.0;
+const LEAST_SAMPLES: f64 = 0.5;
+
 /// Sampling of the exchange of a scene that is cut into so many elements. 16 batches of 2 sets of 16 axes give 0.3
 /// to 0.45 % in NIR.
 pub(super) fn lines(
@@ -62,7 +66,10 @@ pub(super) fn lines(
             (SETS * thin(canopy, scale) / (finer * finer)).ceil() as u32,
             4.0,
         ),
-        Estimator::Rays => (0, (RAYS / (finer * finer)).round().clamp(8.0, 1e6)),
+        Estimator::Rays => {
+            let fewest = if aims.thin { 1.0 } else { 8.0 };
+            (0, (RAYS / (finer * finer)).round().clamp(fewest, 1e6))
+        }
     };
     let axes = Axes::Both;
     let most_lines = LINES_ANYWHERE
@@ -72,17 +79,30 @@ pub(super) fn lines(
     // lines see |cos| of an area, whose mean over the hemisphere is 1/2
     let of_organs = 0.5 * scale.organ_area_m2 / lines_on_organ(canopy, scale);
     let of_elements = 0.5 * scale.area_m2 / elements.max(1) as f64 * directions / ON_ELEMENT;
+    let line_area_m2 = of_organs
+        .min(of_elements)
+        .min(4.5 * scale.triangle_area_m2)
+        .min(scale.ground_area_m2 / 1000.0)
+        .max(scale.ground_area_m2 / most_lines)
+        .max(f64::MIN_POSITIVE);
+    let thinned = if aims.thin && sets_per_batch == 1 {
+        (aims.exchange_percent / coarsest_percent(canopy, scale))
+            .powi(2)
+            .clamp(1.0, MOST_THINNED)
+    } else {
+        1.0
+    };
     Sampling {
         batches: 2 * HALF_BATCHES as u32,
         axes,
         sets_per_batch,
-        line_area_m2: of_organs
-            .min(of_elements)
-            .min(4.5 * scale.triangle_area_m2)
-            .min(scale.ground_area_m2 / 1000.0)
-            .max(scale.ground_area_m2 / most_lines)
-            .max(f64::MIN_POSITIVE),
-        least_samples,
+        line_area_m2: line_area_m2 * thinned,
+        // as many rays would have to make up for lines as are saved
+        least_samples: if thinned > 1.0 {
+            (least_samples / thinned).max(LEAST_SAMPLES)
+        } else {
+            least_samples
+        },
         seed: settings.seed,
     }
 }

@@ -5,9 +5,13 @@
 //! planned by what the last one measured (`next.rs`).
 
 mod accuracy;
+mod clock;
+mod first;
+mod limits;
 mod next;
 mod work;
 
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::time::Instant;
 
 use nestrad_common::light::Sources;
@@ -18,15 +22,20 @@ use thiserror::Error;
 use crate::causes::causes;
 use crate::exchange::RowSource;
 use crate::lit_canopy::LitCanopy;
-use crate::plan::{Aims, AtFinest, Plan, PlanError, Settings, WorkCounts};
+use crate::plan::{Aims, AtFinest, Plan, PlanError, Settings, TracePlan, WorkCounts};
+use crate::resident::Resident;
 use crate::run::Run;
 use crate::solution::{BandAccount, Solution};
+use crate::solve_error::FailureKind;
 use crate::stopwatch::Stopwatch;
-use crate::traced::{self, SolveError, WorkDone};
+use crate::traced::{SolveError, WorkDone};
 use accuracy::worst;
 pub use accuracy::{Accuracy, Ended, Round};
+use clock::Clock;
+use first::first;
+use limits::Choice;
 use next::Measured;
-use work::work_s;
+use work::{PARTS, work_s};
 
 /// The last round, and how it came to it.
 #[derive(Clone, Debug)]
@@ -70,8 +79,15 @@ pub enum RoundsError {
     Solve(#[from] SolveError),
 }
 
-/// A coarse look comes first where it takes less than this part of what is planned without one.
-const WORTH_A_LOOK: f64 = 0.2;
+impl RoundsError {
+    /// Its kind.
+    pub fn kind(&self) -> FailureKind {
+        match self {
+            Self::Plan(error) => error.kind(),
+            Self::Solve(error) => error.kind(),
+        }
+    }
+}
 
 /// Never more rounds than this.
 const MOST_ROUNDS: usize = 5;
@@ -88,47 +104,105 @@ pub fn solve_in_rounds(
     rows: &dyn RowSource,
     run: &Run,
     watch: &mut Stopwatch,
+    begins: impl FnMut(&Plan, &[Round]),
+) -> Result<Solved, RoundsError> {
+    let resident = &mut Resident::between_rounds();
+    light_in_rounds((scene, resident), settings, rows, run, watch, begins)
+}
+
+/// The same with a canopy that may be resident, and is so afterwards if there is room. It begins as finely as it was
+/// traced: another light traces nothing unless it needs more.
+pub fn light_in_rounds(
+    (scene, resident): (&Scene, &mut Resident),
+    settings: &Settings,
+    rows: &dyn RowSource,
+    run: &Run,
+    watch: &mut Stopwatch,
     mut begins: impl FnMut(&Plan, &[Round]),
 ) -> Result<Solved, RoundsError> {
-    let begun = Instant::now();
+    let mut clock = settings.budget_s.map(Clock::start);
     loop {
-        match rounds(scene, settings, (rows, run), (begun, watch), &mut begins) {
-            Err(RoundsError::Solve(error)) if error.is_distrust() => {}
+        let means = (rows, run, &mut *watch);
+        let solved = rounds(
+            (scene, &mut *resident),
+            settings,
+            means,
+            &mut clock,
+            &mut begins,
+        );
+        match solved {
+            // what was traced so far may be wrong
+            Err(RoundsError::Solve(error)) if error.is_distrust() => resident.forget(),
             ended => return ended,
         }
     }
 }
 
+/// The rounds, where every worker can be trusted.
 fn rounds(
-    scene: &Scene,
+    (scene, resident): (&Scene, &mut Resident),
     settings: &Settings,
-    (rows, run): (&dyn RowSource, &Run),
-    (begun, watch): (Instant, &mut Stopwatch),
+    (rows, run, watch): (&dyn RowSource, &Run, &mut Stopwatch),
+    clock: &mut Option<Clock>,
     begins: &mut impl FnMut(&Plan, &[Round]),
 ) -> Result<Solved, RoundsError> {
     let asked = settings.accuracy_percent;
-    let (mut sources, mut plan) = first(scene, settings)?;
+    let (mut sources, mut plan) = match resident.traced_for(&scene.canopy, settings) {
+        Some(traced) => again(scene, settings, traced)?,
+        None => first(scene, settings, clock.as_ref())?,
+    };
     let mut rounds = Vec::new();
-    let mut last: Option<Solved> = None;
+    let mut best: Option<Solved> = None;
     loop {
         begins(&plan, &rounds);
         watch.lap("plan");
         run.stop.check().map_err(SolveError::from)?;
         let round_begun = Instant::now();
         let lit = lit_canopy(scene, &sources);
-        let (solution, work) = match (traced::solve(&lit, &plan, rows, run, watch), last) {
-            (Ok(done), _) => done,
+        let canopy = (&scene.canopy, settings);
+        let in_time = run.stop.part();
+        let alarm = clock
+            .as_ref()
+            .and_then(|c| c.alarm(best.is_none(), &in_time));
+        let timed = Run {
+            stop: &in_time,
+            ..*run
+        };
+        // a panic must not take the results of the round before with it
+        let round = catch_unwind(AssertUnwindSafe(|| {
+            resident.solve(canopy, (&lit, &plan), rows, &timed, watch)
+        }));
+        let round = round.unwrap_or_else(|panic| Err(SolveError::of_panic(&*panic)));
+        drop(alarm);
+        let (solution, work) = match (round, best) {
+            (Ok(done), before) => {
+                best = before;
+                done
+            }
             (Err(error), _) if error.is_distrust() => return Err(error.into()),
             // whoever wants no more does not want the round before either
-            (Err(error @ SolveError::Stopped(_)), _) | (Err(error), None) => {
-                return Err(error.into());
+            (Err(SolveError::Stopped(stopped)), _) if run.stop.check().is_err() => {
+                return Err(SolveError::Stopped(stopped).into());
             }
+            (Err(SolveError::Stopped(_)), Some(mut before)) => {
+                before.accuracy.ended = Ended::OutOfTime;
+                return Ok(before);
+            }
+            (Err(SolveError::Stopped(_)), None) => {
+                let needed_s = round_begun.elapsed().as_secs_f64();
+                let limit_s = settings.budget_s.unwrap_or_default();
+                return Err(PlanError::Overtime { needed_s, limit_s }.into());
+            }
+            (Err(error), None) => return Err(error.into()),
             (Err(error), Some(mut before)) => {
                 before.accuracy.failure = Some(causes(&error));
                 return Ok(before);
             }
         };
-        let took_s = round_begun.elapsed().as_secs_f64();
+        // what was lit again by rows that were there tells nothing of others
+        if let Some(clock) = clock.as_mut().filter(|_| work.jobs.traced > 0) {
+            clock.learn(&lit, &plan, round_begun.elapsed().as_secs_f64());
+        }
         let reached_percent = worst(&solution.account).map(BandAccount::total_percent);
         rounds.push(Round {
             planned: plan.aims,
@@ -138,35 +212,35 @@ fn rounds(
             aims: plan.aims,
             coarsest_exchange_percent: plan.coarsest_exchange_percent(&scene.canopy),
             errors: &solution.account,
-            fixed: {
-                let finest = plan.at_finest();
-                let sky = scene.light.sky.is_none() || finest.sky;
-                let AtFinest {
-                    exchange,
-                    direct,
-                    elements,
-                    soil,
-                    ..
-                } = finest;
-                [exchange, direct, sky, elements, soil]
-            },
+            fixed: fixed(scene, &plan),
             cost_s: work_s(&WorkCounts::of(&lit, &plan)),
         };
-        let left_s = settings.budget_s.map(|s| s - begun.elapsed().as_secs_f64());
+        let choice = Choice {
+            scene,
+            settings,
+            last: (&sources, &plan),
+            measured: &measured,
+            clock: clock.as_ref(),
+        };
         let next = if reached_percent.is_none_or(|reached| reached <= asked) {
             Err(Ended::Reached)
         } else if !settings.in_rounds {
-            Err(Ended::NotAsked)
+            Err(if plan.is_limited() {
+                Ended::BeyondLimits
+            } else {
+                Ended::NotAsked
+            })
         } else if rounds.len() >= MOST_ROUNDS {
             Err(Ended::OutOfRounds)
         } else {
-            following(&measured, asked, left_s.map(|left_s| (took_s, left_s)))
+            let finer = measured.finer(asked).ok_or(Ended::NoFiner);
+            finer.and_then(|finer| choice.next(&finer))
         };
-        let next = next.and_then(|aims| within_limits(scene, settings, (&sources, &plan), &aims));
+        let ended = next.as_ref().err().copied().unwrap_or(Ended::Failed);
         let solved = Solved {
             accuracy: Accuracy {
                 asked_percent: asked,
-                ended: next.as_ref().err().copied().unwrap_or(Ended::Failed),
+                ended,
                 rounds: rounds.clone(),
                 errors: solution.account.clone(),
                 failure: None,
@@ -175,44 +249,70 @@ fn rounds(
             solution,
             work,
         };
+        let solved = match best.take() {
+            Some(before) => better_of(before, solved),
+            None => solved,
+        };
         match next {
             Ok(next) => {
                 (sources, plan) = next;
-                last = Some(solved);
+                best = Some(solved);
             }
             Err(_) => return Ok(solved),
         }
     }
 }
 
-/// The first round: what is asked for, or a coarse look where that saves.
-fn first(scene: &Scene, settings: &Settings) -> Result<(Sources, Plan), PlanError> {
-    let aims = Aims::of(settings.accuracy_percent);
-    let sources = sources_for(scene, &aims, settings);
-    let plan = Plan::new(&lit_canopy(scene, &sources), settings);
-    if !settings.in_rounds {
-        return Ok((sources, plan?));
-    }
-    let aims = Aims::pilot(settings.accuracy_percent);
-    let coarse = sources_for(scene, &aims, settings);
-    let look = Plan::aimed(&lit_canopy(scene, &coarse), settings, &aims);
-    let all_s = |sources, plan| {
-        let counts = WorkCounts::of(&lit_canopy(scene, sources), plan);
-        work_s(&counts).iter().sum::<f64>()
-    };
-    match (plan, look) {
-        (Ok(plan), Ok(look))
-            if settings.budget_s.is_some()
-                || all_s(&coarse, &look) < WORTH_A_LOOK * all_s(&sources, &plan) =>
-        {
-            Ok((coarse, look))
+/// The plan that a solve begins with: whatever refuses a solve before anything is computed refuses this.
+pub fn first_plan(scene: &Scene, settings: &Settings) -> Result<Plan, RoundsError> {
+    let clock = settings.budget_s.map(Clock::start);
+    Ok(first(scene, settings, clock.as_ref())?.1)
+}
+
+/// The better of two rounds, where a limit shaped the later one: it may have been worse. What ended it all is that of
+/// the later one.
+fn better_of(before: Solved, after: Solved) -> Solved {
+    let reached = |solved: &Solved| worst(&solved.accuracy.errors).map(BandAccount::total_percent);
+    if after.plan.is_limited() && reached(&before) < reached(&after) {
+        Solved {
+            accuracy: Accuracy {
+                errors: before.accuracy.errors,
+                ..after.accuracy
+            },
+            ..before
         }
-        // it may not need as much as it was planned with
-        (Err(PlanError::Memory { .. } | PlanError::Elements { .. }), Ok(look)) => {
-            Ok((coarse, look))
-        }
-        (plan, _) => Ok((sources, plan?)),
+    } else {
+        after
     }
+}
+
+/// The first round of a canopy that was traced by such a plan, for such aims.
+fn again(
+    scene: &Scene,
+    settings: &Settings,
+    (trace, aims): (&TracePlan, &Aims),
+) -> Result<(Sources, Plan), PlanError> {
+    let sources = sources_for(scene, aims, settings);
+    let plan = Plan::of_traced(&lit_canopy(scene, &sources), settings, (trace, aims))?;
+    Ok((sources, plan))
+}
+
+/// Which parts no plan makes finer.
+fn fixed(scene: &Scene, plan: &Plan) -> [bool; PARTS] {
+    let AtFinest {
+        exchange,
+        direct,
+        sky,
+        elements,
+        soil,
+    } = plan.at_finest();
+    [
+        exchange,
+        direct,
+        scene.light.sky.is_none() || sky,
+        elements,
+        soil,
+    ]
 }
 
 /// The sources of a scene, with as many directions of its sky as the aims ask for.
@@ -226,65 +326,4 @@ fn lit_canopy<'a>(scene: &'a Scene, sources: &'a Sources) -> LitCanopy<'a> {
         optics: &scene.optics,
         sources,
     }
-}
-
-/// The next round, as finely as the limits allow: what memory stands against must not keep it from helping the rest.
-fn within_limits(
-    scene: &Scene,
-    settings: &Settings,
-    (sources, last): (&Sources, &Plan),
-    finer: &Aims,
-) -> Result<(Sources, Plan), Ended> {
-    for part in OF_THE_WAY {
-        let aims = last.aims.towards(finer, part);
-        if part < 1.0 && !is_worth_a_round(&last.aims, &aims) {
-            break;
-        }
-        let sources = if aims.sky_percent < last.aims.sky_percent {
-            sources_for(scene, &aims, settings)
-        } else {
-            sources.clone()
-        };
-        match Plan::aimed(&lit_canopy(scene, &sources), settings, &aims) {
-            Ok(plan) => return Ok((sources, plan)),
-            Err(PlanError::Memory { .. } | PlanError::Elements { .. }) => {}
-            Err(_) => break,
-        }
-    }
-    Err(Ended::BeyondLimits)
-}
-
-/// Parts of the way to finer aims that are tried, of what takes memory.
-const OF_THE_WAY: [f64; 5] = [1.0, 0.9, 0.75, 0.5, 0.0];
-
-/// Whether any part of what is left of a plan would be finer by enough to be worth a round.
-fn is_worth_a_round(last: &Aims, next: &Aims) -> bool {
-    const ENOUGH: f64 = 0.9;
-    let parts = |aims: &Aims| {
-        [
-            aims.exchange_percent,
-            aims.direct_percent,
-            aims.sky_percent,
-            aims.elements_percent,
-            aims.soil_percent,
-        ]
-    };
-    let pairs = parts(next).into_iter().zip(parts(last));
-    pairs.into_iter().any(|(next, last)| next < ENOUGH * last)
-}
-
-/// What to plan the next round for; where time is limited, with what the last one took and what is left.
-fn following(
-    measured: &Measured,
-    asked: f64,
-    took_and_left_s: Option<(f64, f64)>,
-) -> Result<Aims, Ended> {
-    let finer = measured.finer(asked).ok_or(Ended::NoFiner)?;
-    let finer = match took_and_left_s {
-        Some((took_s, left_s)) => measured
-            .within(finer, took_s, left_s)
-            .ok_or(Ended::OutOfTime)?,
-        None => finer,
-    };
-    Ok(measured.aims(&finer))
 }

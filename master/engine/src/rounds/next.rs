@@ -89,29 +89,39 @@ impl Measured<'_> {
         of_parts.sum::<f64>() + parts.far_field_percent * parts.far_field_percent
     }
 
-    /// The same where only so much time is left, when the last round took `took_s`; none where what fits would
-    /// hardly help.
-    pub(super) fn within(&self, finer: PerPart, took_s: f64, left_s: f64) -> Option<PerPart> {
-        let longer = |part: f64| {
-            let cost: f64 = (0..PARTS)
-                .map(|k| self.cost_s[k] * finer[k].powf(-2.0 * part))
-                .sum();
-            cost / self.cost_s.iter().sum::<f64>().max(f64::MIN_POSITIVE)
+    /// The error of the worst band that a plan for other aims should have, percent.
+    pub(super) fn predicted_percent(&self, next: &Aims) -> f64 {
+        let last = Aims {
+            exchange_percent: self
+                .aims
+                .exchange_percent
+                .min(self.coarsest_exchange_percent),
+            ..self.aims
         };
-        let fits = |part: f64| took_s * longer(part) <= left_s;
-        if fits(1.0) {
-            return Some(finer);
-        }
-        let (mut low, mut high) = (0.0, 1.0);
-        for _ in 0..30 {
-            let middle = 0.5 * (low + high);
-            if fits(middle) {
-                low = middle;
-            } else {
-                high = middle;
+        let ratio: PerPart = {
+            let (next, last) = (parts_of(next), parts_of(&last));
+            std::array::from_fn(|k| {
+                if self.fixed[k] {
+                    1.0
+                } else {
+                    next[k] / last[k]
+                }
+            })
+        };
+        let of_band = |band: &BandAccount| {
+            let all = all_parts(band);
+            BandAccount {
+                exchange_percent: ratio[0] * all[0],
+                direct_percent: ratio[1] * all[1],
+                sky_percent: ratio[2] * all[2],
+                elements_percent: ratio[3] * all[3],
+                soil_percent: ratio[4] * all[4],
+                solver_percent: ratio[0] * band.solver_percent,
+                ..band.clone()
             }
-        }
-        (low > HARDLY).then(|| finer.map(|s| s.powf(low)))
+            .total_percent()
+        };
+        self.errors.iter().map(of_band).fold(0.0, f64::max)
     }
 
     /// The aims that go with errors smaller by these factors.
@@ -128,6 +138,7 @@ impl Measured<'_> {
             sky_percent: last.sky_percent * finer[2],
             elements_percent: last.elements_percent * finer[3],
             soil_percent: last.soil_percent * finer[4],
+            ..*last
         }
         .not_below_the_least()
     }
@@ -144,8 +155,16 @@ fn all_parts(parts: &BandAccount) -> PerPart {
     ]
 }
 
-/// A round that goes less than this part of the way is not worth its time.
-const HARDLY: f64 = 0.2;
+/// What the parts of a plan are to err by.
+fn parts_of(aims: &Aims) -> PerPart {
+    [
+        aims.exchange_percent,
+        aims.direct_percent,
+        aims.sky_percent,
+        aims.elements_percent,
+        aims.soil_percent,
+    ]
+}
 
 /// Factors on errors, at most 1, that bring the sum of squares of each band down to 1 for the least cost.
 ///
@@ -348,14 +367,22 @@ mod tests {
     }
 
     #[test]
-    fn a_round_that_fits_no_more_is_made_coarser_or_left_out() {
-        let errors = [parts([1.0, 0.5, 0.0, 0.5, 0.0])];
-        let measured = measured(&errors);
+    fn an_error_is_predicted_in_proportion_to_what_is_aimed_at() {
+        let errors = [
+            parts([1.0, 0.5, 0.0, 0.5, 0.0]),
+            parts([0.2, 0.1, 0.0, 0.1, 0.0]),
+        ];
+        let mut measured = measured(&errors);
+        measured.aims.exchange_percent = 2.0;
+        let same = measured.predicted_percent(&measured.aims);
+        // twice as coarse a plan was not
+        assert!(same > errors[0].total_percent());
+        measured.coarsest_exchange_percent = f64::INFINITY;
+        let same = measured.predicted_percent(&measured.aims);
+        assert!((same - errors[0].total_percent()).abs() < 1e-12);
         let finer = [0.25, 0.5, 1.0, 0.5, 1.0];
-        assert_eq!(measured.within(finer, 1.0, 100.0), Some(finer));
-        let fits = measured.within(finer, 1.0, 4.0).unwrap();
-        assert!(fits[0] > finer[0] && fits[0] < 1.0, "{fits:?}");
-        assert_eq!(measured.within(finer, 1.0, 1.1), None);
-        assert_eq!(measured.within(finer, 1.0, -1.0), None);
+        let next = measured.aims(&finer);
+        let expected = parts([0.25, 0.25, 0.0, 0.25, 0.0]).total_percent();
+        assert!((measured.predicted_percent(&next) - expected).abs() < 1e-12);
     }
 }

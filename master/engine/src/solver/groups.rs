@@ -35,6 +35,12 @@ struct Piece {
 }
 
 impl Groups {
+    /// Bytes that it takes.
+    pub fn bytes(&self) -> u64 {
+        let of_soil = self.soil.ways.iter().map(|way| size_of_val(&way[..]));
+        (size_of_val(&self.of_face[..]) + of_soil.sum::<usize>()) as u64
+    }
+
     /// Groups the elements of each organ, faces of one side together, and the soil.
     ///
     /// The triangles of an organ have to lie one after the other, as the frame has them.

@@ -6,7 +6,7 @@ use nestrad_common::canopy::Canopy;
 use nestrad_common::options::TableFormat;
 use nestrad_engine::solution::Solution;
 
-use crate::atomic::Staging;
+use crate::atomic::{Staging, check_writable};
 use crate::error::OutputError;
 use crate::summary::Summary;
 use crate::table::Table;
@@ -40,6 +40,11 @@ const ALL_FILES: [&str; 9] = [
     REPORT,
     SUMMARY,
 ];
+
+/// Refuses a folder that a result could not be written into; for the beginning of a solve.
+pub fn check_place(dir: &Path) -> Result<(), OutputError> {
+    check_writable(dir, &ALL_FILES)
+}
 
 /// A result that lies complete beside its place, but for its summary.
 #[derive(Debug)]

@@ -1,9 +1,9 @@
 //! The results of a solve, read back from its folder.
 
 use std::collections::HashMap;
-use std::fs;
 use std::path::Path;
 
+use nestrad_common::bounded::{self, Limit};
 use nestrad_common::options::{Unit, Up};
 use nestrad_engine::rounds::Accuracy;
 use nestrad_engine::solution::Balance;
@@ -156,6 +156,9 @@ pub(crate) struct Results {
     pub(crate) soil: Option<Soil>,
 }
 
+/// A summary names materials and warnings, and is no larger than this.
+const SUMMARY: Limit = Limit::fixed(64 << 20);
+
 /// Kinds that are parts of plants.
 const PLANTS: [&str; 2] = ["leaf", "stem"];
 
@@ -167,7 +170,7 @@ pub(crate) fn read(folder: &Path) -> Result<Results, ReportError> {
     let organs = organs(folder, &bands)?;
     let triangles = triangles(folder, &bands, &organs)?;
     let soil = match Table::find(folder, "soil")? {
-        Some(table) => soil(&table, &bands)?,
+        Some(mut table) => soil(&mut table, &bands)?,
         None => None,
     };
     Ok(Results {
@@ -185,11 +188,11 @@ fn summary(folder: &Path) -> Result<SummaryFacts, ReportError> {
         let folder = folder.to_owned();
         return Err(ReportError::NoResult { folder });
     }
-    let text = match fs::read_to_string(&path) {
+    let text = match bounded::read(&path, SUMMARY) {
         Ok(text) => text,
         Err(source) => return Err(ReportError::Read { path, source }),
     };
-    let read = serde_json::from_str(&text).and_then(|summary: SummaryFacts| {
+    let read = serde_json::from_slice(&text).and_then(|summary: SummaryFacts| {
         if summary.energy_balance.is_empty() {
             return Err(serde_json::Error::custom("energy_balance has no bands"));
         }
@@ -218,7 +221,7 @@ fn organs(folder: &Path, bands: &[String]) -> Result<Vec<Organ>, ReportError> {
     ];
     let mut organs: Vec<Organ> = Vec::new();
     let mut rows = 0;
-    let table = Table::open(folder, "organs")?;
+    let mut table = Table::open(folder, "organs")?;
     table.rows(&columns, |row| {
         row.must_be(5, &bands[rows % bands.len()])?;
         if rows.is_multiple_of(bands.len()) {
@@ -273,7 +276,7 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
         [species, plant, organ].map(String::as_str)
     });
     let by_name: HashMap<[&str; 3], u32> = names.zip(0..).collect();
-    let table = Table::open(folder, "triangles")?;
+    let mut table = Table::open(folder, "triangles")?;
     let mut found = Triangles::default();
     table.rows(&columns, |row| {
         let (triangle, band) = (
@@ -306,7 +309,7 @@ fn triangles(folder: &Path, bands: &[String], organs: &[Organ]) -> Result<Triang
     Ok(found)
 }
 
-fn soil(table: &Table, bands: &[String]) -> Result<Option<Soil>, ReportError> {
+fn soil(table: &mut Table, bands: &[String]) -> Result<Option<Soil>, ReportError> {
     let columns = [
         "ix",
         "iy",

@@ -10,6 +10,7 @@ mod record;
 mod scale;
 mod table;
 
+use std::borrow::Cow;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -26,7 +27,7 @@ use self::data::{Organ, Results, Soil, SpreadFacts};
 use self::page::Blob;
 use self::profile::{LIT_STEP, Layer, Patch};
 use self::scale::Scale;
-use crate::atomic::Staging;
+use crate::atomic::{Staging, check_writable};
 use crate::error::OutputError;
 use crate::folder::REPORT;
 
@@ -114,6 +115,12 @@ struct Scales<'a> {
 
 /// Reads a folder of results and writes a page into it.
 pub fn write(request: &Request<'_>) -> Result<Written, ReportError> {
+    // before the work, not after it
+    check_writable(request.out, &[REPORT])?;
+    if let Some(picture) = &request.picture {
+        let (folder, name) = place_of(picture.path);
+        check_writable(folder, &[&name])?;
+    }
     let results = data::read(request.out)?;
     let canopy = canopy(request, &results)?;
     let picture = request.picture.as_ref();
@@ -213,14 +220,20 @@ fn write_picture(
     let bands = results.bands.len();
     let value = |t: usize| scale.part(results.triangles.light[t * bands + band].absorbed_W_m2);
     let picture = picture::draw(canopy.corners_m(), value, scale, &results.bands[band]);
+    let (folder, name) = place_of(path);
+    let mut staging = Staging::begin(folder)?;
+    staging.write(&name, |out| picture.write_png(out))?;
+    Ok(staging.commit(&name, &[])?)
+}
+
+/// Folder and name of a file that is to be written.
+fn place_of(path: &Path) -> (&Path, Cow<'_, str>) {
     let folder = match path.parent() {
         Some(folder) if !folder.as_os_str().is_empty() => folder,
         _ => Path::new("."),
     };
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let mut staging = Staging::begin(folder)?;
-    staging.write(&name, |out| picture.write_png(out))?;
-    Ok(staging.commit(&name, &[])?)
+    let name = path.file_name().unwrap_or_default();
+    (folder, name.to_string_lossy())
 }
 
 /// The canopy, which must be the one that was solved.

@@ -2,17 +2,19 @@
 //! names: those that nobody asks for may stand anywhere.
 
 use std::borrow::Cow;
-use std::fs::{self, File};
+use std::fs::File;
+use std::io::BufReader;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
+use nestrad_common::bounded;
 use parquet::errors::ParquetError;
 use parquet::file::reader::{FileReader, SerializedFileReader};
 use parquet::record::Field;
 use parquet::schema::types::Type;
 
 use super::error::ReportError;
-use super::record::record;
+use super::record::{Records, cells};
 
 /// A table that is there.
 #[derive(Debug)]
@@ -24,8 +26,8 @@ pub(crate) struct Table {
 }
 
 enum Content {
-    /// Without the header.
-    Csv(String),
+    /// After the header.
+    Csv(Records<BufReader<File>>),
     Parquet(SerializedFileReader<File>),
 }
 
@@ -71,24 +73,26 @@ impl Table {
     }
 
     fn open_csv(path: PathBuf) -> Result<Self, ReportError> {
-        match fs::read_to_string(&path) {
-            Ok(text) => Ok(Self::of_csv(path, &text)),
+        let read = || {
+            let file = bounded::open(&path)?;
+            let mut records = Records::new(BufReader::with_capacity(1 << 16, file));
+            let mut header = Vec::new();
+            cells(records.next()?.unwrap_or_default(), &mut header);
+            let columns = header.into_iter().map(Cow::into_owned).collect();
+            Ok((columns, records))
+        };
+        match read() {
+            Ok((columns, records)) => Ok(Self {
+                path,
+                columns,
+                content: Content::Csv(records),
+            }),
             Err(source) => Err(ReportError::Read { path, source }),
         }
     }
 
-    fn of_csv(path: PathBuf, text: &str) -> Self {
-        let (mut rest, mut header) = (text, Vec::new());
-        record(&mut rest, &mut header);
-        Self {
-            path,
-            columns: header.into_iter().map(Cow::into_owned).collect(),
-            content: Content::Csv(rest.to_owned()),
-        }
-    }
-
     fn open_parquet(path: PathBuf) -> Result<Self, ReportError> {
-        let file = match File::open(&path) {
+        let file = match bounded::open(&path) {
             Ok(file) => file,
             Err(source) => return Err(ReportError::Read { path, source }),
         };
@@ -105,56 +109,54 @@ impl Table {
         })
     }
 
-    /// Calls `each` for all rows, with the cells of these columns.
+    /// Calls `each` for all rows, with the cells of these columns. To be called once.
     pub(crate) fn rows(
-        &self,
+        &mut self,
         columns: &[&str],
         mut each: impl FnMut(&Row<'_>) -> Result<(), ReportError>,
     ) -> Result<(), ReportError> {
         let place = |name: &&str| self.columns.iter().position(|own| own == name);
         let places: Option<Vec<usize>> = columns.iter().map(place).collect();
-        let mut row = Row {
-            path: &self.path,
-            number: 1,
-            cells: Vec::new(),
-            columns,
-        };
+        let path = &self.path;
         let Some(places) = places else {
             let wanted = format!("the columns {}", columns.join(","));
+            let row = Row::new(path, columns, 1, Vec::new());
             return Err(row.not(&wanted, &self.columns.join(",")));
         };
-        match &self.content {
-            Content::Csv(text) => {
-                let (mut rest, mut cells) = (text.as_str(), Vec::new());
-                while !rest.is_empty() {
-                    row.number += 1;
-                    record(&mut rest, &mut cells);
-                    if cells.len() != self.columns.len() {
+        let mut number = 1;
+        match &mut self.content {
+            Content::Csv(records) => {
+                let read = |source| ReportError::Read {
+                    path: path.clone(),
+                    source,
+                };
+                while let Some(record) = records.next().map_err(read)? {
+                    number += 1;
+                    let mut all = Vec::with_capacity(self.columns.len());
+                    cells(record, &mut all);
+                    if all.len() != self.columns.len() {
                         let wanted = format!("{} cells", self.columns.len());
-                        return Err(row.not(&wanted, &cells.len().to_string()));
+                        let found = all.len().to_string();
+                        let row = Row::new(path, columns, number, Vec::new());
+                        return Err(row.not(&wanted, &found));
                     }
-                    row.cells.clear();
-                    let texts = places.iter().map(|&place| cells[place].clone());
-                    row.cells.extend(texts.map(Cell::Text));
-                    each(&row)?;
+                    let wanted = places.iter().map(|&place| Cell::Text(all[place].clone()));
+                    each(&Row::new(path, columns, number, wanted.collect()))?;
                 }
             }
             Content::Parquet(reader) => {
-                let broken = |error| self.not_parquet(error);
+                let broken = |source| ReportError::Parquet {
+                    path: path.clone(),
+                    source,
+                };
                 let mut rows = guarded(|| parquet_rows(reader, columns)).map_err(broken)?;
                 while let Some(cells) = guarded(|| rows.next().transpose()).map_err(broken)? {
-                    row.number += 1;
-                    row.cells = cells;
-                    each(&row)?;
+                    number += 1;
+                    each(&Row::new(path, columns, number, cells))?;
                 }
             }
         }
         Ok(())
-    }
-
-    fn not_parquet(&self, source: ParquetError) -> ReportError {
-        let path = self.path.clone();
-        ReportError::Parquet { path, source }
     }
 
     /// The error of a table that does not have a row for all that there are.
@@ -203,6 +205,17 @@ fn cell(field: &Field) -> Cell<'static> {
         Field::Double(value) => Cell::Real(*value),
         Field::Long(value) => Cell::Index(*value),
         other => Cell::Text(other.to_string().into()),
+    }
+}
+
+impl<'a> Row<'a> {
+    fn new(path: &'a Path, columns: &'a [&'a str], number: usize, cells: Vec<Cell<'a>>) -> Self {
+        Self {
+            path,
+            number,
+            cells,
+            columns,
+        }
     }
 }
 
@@ -267,46 +280,64 @@ impl std::fmt::Debug for Content {
 
 #[cfg(test)]
 mod tests {
+    use std::fs;
+
     use super::*;
     use crate::table::{self, Column};
 
-    fn table(text: &str) -> Table {
-        Table::of_csv("t.csv".into(), text)
+    fn rows(
+        text: &str,
+        columns: &[&str],
+        each: impl FnMut(&Row<'_>) -> Result<(), ReportError>,
+    ) -> Result<(), ReportError> {
+        let folder = tempfile::tempdir().expect("a folder");
+        fs::write(folder.path().join("t.csv"), text).expect("written");
+        Table::open(folder.path(), "t")?.rows(columns, each)
     }
 
     #[test]
     fn rows_are_counted_in_errors() {
-        let table = table("band,x\nPAR,1.5\nPAR,much\n");
         let mut sum = 0.0;
-        let error = table.rows(&["band", "x"], |row| {
+        let error = rows("band,x\rPAR,1.5\rPAR,much\r", &["band", "x"], |row| {
             sum += row.real(1)?;
             Ok(())
         });
         assert_eq!(sum, 1.5);
-        assert_eq!(
-            error.expect_err("refused").to_string(),
-            "t.csv, row 3: expected a number for x, found much"
-        );
+        let error = error.expect_err("refused").to_string();
+        let expected = "t.csv, row 3: expected a number for x, found much";
+        assert!(error.ends_with(expected), "{error}");
     }
 
     #[test]
     fn another_table_is_refused() {
-        let error = table("a,b\n").rows(&["band"], |_| Ok(()));
-        assert!(error.is_err());
-        let error = table("band,x\nPAR\n").rows(&["band", "x"], |_| Ok(()));
-        assert!(error.is_err());
+        assert!(rows("a,b\n", &["band"], |_| Ok(())).is_err());
+        assert!(rows("band,x\nPAR\n", &["band", "x"], |_| Ok(())).is_err());
     }
 
     #[test]
     fn columns_are_found_in_any_order() {
-        let mut rows = Vec::new();
-        table("new,x,band\n7,1.5,PAR\n")
-            .rows(&["band", "x"], |row| {
-                rows.push((row.text(0).into_owned(), row.real(1)?));
-                Ok(())
-            })
-            .expect("read");
-        assert_eq!(rows, [("PAR".to_owned(), 1.5)]);
+        let mut found = Vec::new();
+        rows("new,x,band\n7,1.5,PAR\n", &["band", "x"], |row| {
+            found.push((row.text(0).into_owned(), row.real(1)?));
+            Ok(())
+        })
+        .expect("read");
+        assert_eq!(found, [("PAR".to_owned(), 1.5)]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_table_without_end_is_refused() {
+        for ending in ["csv", "parquet"] {
+            let folder = tempfile::tempdir().expect("a folder");
+            let path = folder.path().join("t").with_extension(ending);
+            std::os::unix::fs::symlink("/dev/zero", &path).expect("linked");
+            assert!(Table::open(folder.path(), "t").is_err());
+            fs::remove_file(&path).expect("removed");
+            let file = File::create(&path).expect("made");
+            file.set_len(1 << 40).expect("sparse");
+            assert!(Table::open(folder.path(), "t").is_err());
+        }
     }
 
     #[test]
@@ -327,7 +358,7 @@ mod tests {
         let mut read = |bytes: &[u8]| {
             fs::write(folder.path().join("t.parquet"), bytes).expect("written");
             let table = Table::open(folder.path(), "t");
-            let rows = table.and_then(|table| {
+            let rows = table.and_then(|mut table| {
                 let each = |row: &Row<'_>| row.index(0).and(row.real(2)).map(drop);
                 table.rows(&["triangle", "band", "x"], each)
             });
@@ -359,7 +390,7 @@ mod tests {
         };
         let folder = tempfile::tempdir().expect("a folder");
         let read = || {
-            let table = Table::open(folder.path(), "t").expect("there");
+            let mut table = Table::open(folder.path(), "t").expect("there");
             let mut rows = Vec::new();
             let columns = ["x", "triangle", "band"];
             let each = |row: &Row<'_>| {

@@ -5,9 +5,13 @@ use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use nestrad_common::bounded::{self, Limit, with_line_feeds};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
+
+/// Some hundred bytes are a run.
+const LIMIT: Limit = Limit::fixed(256 << 20);
 
 /// Lines of JSON, each a key and a record. The last record of a key counts.
 #[derive(Debug)]
@@ -58,12 +62,13 @@ impl<R: Serialize + DeserializeOwned> Ledger<R> {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(failed)?;
         }
-        let text = match std::fs::read(path) {
+        let text = match bounded::read(path, LIMIT) {
             Err(error) if error.kind() == io::ErrorKind::NotFound => Vec::new(),
             read => read.map_err(failed)?,
         };
         let (mut records, mut unreadable) = (HashMap::new(), Vec::new());
-        for (number, line) in text.split(|&byte| byte == b'\n').enumerate() {
+        let lines = with_line_feeds(&text);
+        for (number, line) in lines.split(|&byte| byte == b'\n').enumerate() {
             match serde_json::from_slice::<Keyed<R>>(line) {
                 Ok(Keyed { key, record }) => {
                     records.insert(key, record);
@@ -78,7 +83,7 @@ impl<R: Serialize + DeserializeOwned> Ledger<R> {
             .append(true)
             .open(path)
             .map_err(failed)?;
-        if text.last().is_some_and(|&last| last != b'\n') {
+        if lines.last().is_some_and(|&last| last != b'\n') {
             file.write_all(b"\n").map_err(failed)?;
         }
         Ok(Self {

@@ -18,5 +18,5 @@ pub mod table;
 mod terminal;
 
 pub use error::TradeError;
-pub use folder::write;
+pub use folder::{check_place, write};
 pub use page::About;

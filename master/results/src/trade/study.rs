@@ -11,6 +11,7 @@ use nestrad_engine::traced::SolveError;
 use serde::{Deserialize, Serialize};
 
 use super::error::TradeError;
+use super::folder::RECORDS;
 use super::keys::{digest, key};
 use super::ledger::Ledger;
 use super::measure::Reference;
@@ -89,7 +90,7 @@ pub fn carry_out(
     run: &Run,
     mut say: impl FnMut(&str),
 ) -> Result<Study, TradeError> {
-    let mut ledger = Ledger::open(&request.out.join("trade.jsonl"))?;
+    let mut ledger = Ledger::open(&request.out.join(RECORDS))?;
     for line in ledger.unreadable() {
         say(&format!(
             "trade.jsonl: line {line} is not a record and is ignored"

@@ -2,7 +2,8 @@
 //! the same to the last bit as if they were computed here.
 //!
 //! A master that is lost is looked for again; one that has forgotten scene or solve (it was started
-//! anew, or had no room) gets them once more. Both end after a time, or after a few rounds.
+//! anew, or had no room) gets them once more. Both end after a time, or after a few rounds. One that has no room for
+//! the scene or the solve is asked again when it says, for a longer time.
 
 mod error;
 mod results;
@@ -15,13 +16,14 @@ use nestrad_common::options::Diameter;
 use nestrad_common::scene::Scene;
 use nestrad_engine::plan::{DEFAULT_ACCURACY_PERCENT, Estimator, Settings};
 use nestrad_engine::progress::StageProgress;
+use nestrad_engine::traced::FailureKind;
 use nestrad_proto::channel::Authorized;
 use nestrad_proto::v1::solve_service_client::SolveServiceClient;
-use nestrad_proto::{MAX_MESSAGE_BYTES, v1};
+use nestrad_proto::{MAX_MESSAGE_BYTES, RETRY_AFTER, reason, v1};
 use tokio::time::{sleep, timeout};
 use tonic::{Code, Status};
 
-pub use error::RemoteError;
+pub use error::{RefusalKind, RemoteError};
 use results::Arriving;
 pub use solved::SolvedThere;
 
@@ -30,6 +32,12 @@ const FIRST_PATIENCE: Duration = Duration::from_secs(10);
 
 /// A master that was reached is given up when it was away for so long.
 const PATIENCE: Duration = Duration::from_secs(60);
+
+/// A master that has no room is asked for so long. Longer than it keeps results that nobody fetches.
+const BUSY_PATIENCE: Duration = Duration::from_secs(15 * 60);
+
+/// It is asked again after this at most, whatever it says.
+const LONGEST_PAUSE: Duration = Duration::from_secs(60);
 
 /// Pause between two tries.
 const PAUSE: Duration = Duration::from_millis(500);
@@ -40,6 +48,12 @@ const ANSWER: Duration = Duration::from_secs(60);
 /// A master that took the scene, or was about to give the results, so often and then failed will fail
 /// the next time.
 const MOST_ROUNDS: u32 = 8;
+
+/// A stream of progress that ends sooner than this, and tells nothing new, is no good.
+const SHORT: Duration = Duration::from_secs(10);
+
+/// So many of them after one another, and so will be the next.
+const MOST_SHORT: u32 = 10;
 
 /// A master.
 pub type Client = SolveServiceClient<Authorized>;
@@ -75,9 +89,13 @@ pub async fn solve(
         scene,
         options: options(settings),
         geometry_id: None,
+        scene_id: None,
         solve_id: None,
         heard: None,
+        busy: None,
         rounds: 0,
+        told: None,
+        short: 0,
     };
     tokio::select! {
         outcome = session.solve(&mut tell) => outcome,
@@ -109,17 +127,33 @@ fn options(settings: &Settings) -> v1::SolveOptions {
     }
 }
 
+/// What kind of thing went wrong at the master; one of an earlier version does not say.
+fn kind(sent: v1::SolveFailure) -> FailureKind {
+    match sent {
+        v1::SolveFailure::Input => FailureKind::Input,
+        v1::SolveFailure::Limit => FailureKind::Limit,
+        v1::SolveFailure::Fault | v1::SolveFailure::Unspecified => FailureKind::Fault,
+    }
+}
+
 /// What is known of the solve at the master.
 struct Session {
     master: Client,
     scene: Scene,
     options: v1::SolveOptions,
     geometry_id: Option<String>,
+    scene_id: Option<String>,
     solve_id: Option<String>,
     /// When the master last answered.
     heard: Option<Instant>,
+    /// Since when it has had no room.
+    busy: Option<Instant>,
     /// How often it took the scene, or was about to give the results.
     rounds: u32,
+    /// What was last told of the solve.
+    told: Option<v1::SolveProgress>,
+    /// How many streams of progress ended soon, without telling anything new, since one did.
+    short: u32,
 }
 
 /// Why a try came to nothing.
@@ -128,6 +162,12 @@ enum Setback {
     Away(Status),
     /// The master does not know what it was asked for: tell it again.
     Forgotten(Status),
+    /// The master has no room: ask again after a while.
+    Busy {
+        doing: &'static str,
+        status: Status,
+        wait: Duration,
+    },
     /// Trying again is of no use.
     Final(RemoteError),
 }
@@ -141,23 +181,36 @@ impl From<RemoteError> for Setback {
 impl Session {
     async fn solve(&mut self, tell: &mut impl FnMut(Event)) -> Result<SolvedThere, RemoteError> {
         let begun = Instant::now();
-        let mut told = false;
+        let (mut told, mut told_busy) = (false, false);
         loop {
             let status = match self.attempt(tell).await {
                 Ok(solved) => return Ok(solved),
                 Err(Setback::Final(error)) => return Err(error),
+                Err(Setback::Busy {
+                    doing,
+                    status,
+                    wait,
+                }) => {
+                    self.wait(doing, &status, wait, |note| {
+                        if !std::mem::replace(&mut told_busy, true) {
+                            tell(Event::Note(note));
+                        }
+                    })
+                    .await?;
+                    continue;
+                }
                 Err(Setback::Forgotten(status)) => {
-                    self.solve_id = None;
+                    (self.scene_id, self.solve_id) = (None, None);
                     status
                 }
                 Err(Setback::Away(status)) => status,
             };
-            let message = status.message().to_owned();
+            let message = reason::of(&status);
             let (since, patience) = match self.heard {
                 Some(heard) => (heard, PATIENCE),
                 None => (begun, FIRST_PATIENCE),
             };
-            if since.elapsed() > patience || self.rounds > MOST_ROUNDS {
+            if since.elapsed() > patience || self.rounds > MOST_ROUNDS || self.short > MOST_SHORT {
                 return Err(RemoteError::Lost { message });
             }
             if !told {
@@ -170,13 +223,51 @@ impl Session {
         }
     }
 
+    /// Waits for a master that has no room, if it is not asked for too long.
+    async fn wait(
+        &mut self,
+        doing: &'static str,
+        status: &Status,
+        wait: Duration,
+        tell: impl FnOnce(String),
+    ) -> Result<(), RemoteError> {
+        let since = *self.busy.get_or_insert_with(Instant::now);
+        // what it forgets meanwhile is no fault of its
+        self.rounds = 0;
+        // clients that were refused together do not come back together
+        let apart = Duration::from_millis(u64::from(std::process::id() % 1000));
+        let wait = wait.min(LONGEST_PAUSE) + apart;
+        let message = status.message().to_owned();
+        if since.elapsed() + wait > BUSY_PATIENCE {
+            let waited_s = since.elapsed().as_secs();
+            return Err(RemoteError::Busy {
+                doing,
+                message,
+                waited_s,
+            });
+        }
+        let minutes = BUSY_PATIENCE.as_secs() / 60;
+        tell(format!(
+            "the master has no room ({message}): trying again for {minutes} minutes"
+        ));
+        sleep(wait).await;
+        Ok(())
+    }
+
     async fn attempt(&mut self, tell: &mut impl FnMut(Event)) -> Result<SolvedThere, Setback> {
         let solve_id = match &self.solve_id {
             Some(id) => id.clone(),
             None => {
-                let scene_id = self.upload().await?;
-                self.rounds += 1;
+                let scene_id = match &self.scene_id {
+                    Some(id) => id.clone(),
+                    None => {
+                        let id = self.upload().await?;
+                        self.rounds += 1;
+                        self.scene_id.insert(id).clone()
+                    }
+                };
                 let id = self.start(scene_id).await?;
+                self.busy = None;
                 self.solve_id.insert(id).clone()
             }
         };
@@ -231,22 +322,40 @@ impl Session {
         };
         let answer = timeout(ANSWER, self.master.watch_solve(request)).await;
         let mut progress = self.answered(doing, answer)?.into_inner();
+        let (begun, mut news) = (Instant::now(), false);
         loop {
-            let message = match progress.message().await {
+            let message = progress.message().await;
+            if !matches!(message, Ok(Some(_))) {
+                let is_short = !news && begun.elapsed() < SHORT;
+                self.short = if is_short { self.short + 1 } else { 0 };
+            }
+            let message = match message {
                 Ok(Some(message)) => message,
-                Ok(None) => return Err(Setback::Away(Status::unavailable("the stream ended"))),
+                Ok(None) => {
+                    return Err(Setback::Away(Status::unavailable(
+                        "the stream of progress ended before the solve",
+                    )));
+                }
                 Err(status) => return Err(self.setback(doing, status)),
             };
             self.heard = Some(Instant::now());
-            let state = message.state();
+            let (state, failure) = (message.state(), message.failure());
+            let told = v1::SolveProgress {
+                // told at the beginning of every stream
+                plan: Vec::new(),
+                ..message.clone()
+            };
+            news |= self.told.as_ref() != Some(&told);
+            self.told = Some(told);
             for line in message.plan {
                 tell(Event::Plan(line));
             }
             match state {
                 v1::SolveState::Finished => return Ok(()),
                 v1::SolveState::Failed => {
+                    let kind = kind(failure);
                     let reason = message.reason;
-                    return Err(RemoteError::Failed { reason }.into());
+                    return Err(RemoteError::Failed { reason, kind }.into());
                 }
                 v1::SolveState::Cancelled => return Err(RemoteError::Cancelled.into()),
                 _ => tell(Event::Stage(StageProgress {
@@ -274,12 +383,11 @@ impl Session {
             };
             let answer = timeout(ANSWER, self.master.fetch_results(request)).await;
             let mut slices = self.answered(doing, answer)?.into_inner();
-            while let Some(slice) = slices
-                .message()
-                .await
-                .map_err(|status| self.setback(doing, status))?
-            {
-                self.heard = Some(Instant::now());
+            loop {
+                let answer = timeout(ANSWER, slices.message()).await;
+                let Some(slice) = self.answered(doing, answer)? else {
+                    break;
+                };
                 arriving.take(slice)?;
             }
         }
@@ -310,6 +418,9 @@ impl Session {
     }
 
     fn setback(&mut self, doing: &'static str, status: Status) -> Setback {
+        if let Some(message) = reason::of_credentials(&status) {
+            return Setback::Final(RemoteError::Credentials { message });
+        }
         match status.code() {
             // what the transport says of a connection that broke
             Code::Unavailable | Code::Unknown | Code::Cancelled | Code::Internal => {
@@ -319,10 +430,27 @@ impl Session {
                 self.heard = Some(Instant::now());
                 Setback::Forgotten(status)
             }
-            _ => Setback::Final(RemoteError::Refused {
-                doing,
-                message: status.message().to_owned(),
-            }),
+            _ => match retry_after(&status) {
+                Some(wait) => {
+                    self.heard = Some(Instant::now());
+                    Setback::Busy {
+                        doing,
+                        status,
+                        wait,
+                    }
+                }
+                None => Setback::Final(RemoteError::Refused {
+                    doing,
+                    kind: RefusalKind::of(status.code()),
+                    message: status.message().to_owned(),
+                }),
+            },
         }
     }
+}
+
+/// When a master that has no room wants to be asked again, if it says so.
+fn retry_after(status: &Status) -> Option<Duration> {
+    let seconds = status.metadata().get(RETRY_AFTER)?.to_str().ok()?;
+    seconds.parse().ok().map(Duration::from_secs)
 }

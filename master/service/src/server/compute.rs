@@ -1,24 +1,25 @@
 //! The threads that solve: never those of tokio.
 
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
 use nestrad_cluster::store::Store;
 use nestrad_cluster::{Cluster, with_rows};
+use nestrad_common::panics;
 use nestrad_engine::causes::causes;
 use nestrad_engine::heap::Freed;
 use nestrad_engine::plan::Plan;
 use nestrad_engine::rounds::{Round, RoundsError, solve_in_rounds};
 use nestrad_engine::run::Run;
 use nestrad_engine::stopwatch::Stopwatch;
-use nestrad_engine::traced::SolveError;
+use nestrad_engine::traced::FailureKind;
 use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::metrics::Metrics;
 use super::scenes::HeldScene;
 use super::solution::HeldSolution;
-use super::solves::{Phase, Solve, Solves};
+use super::solve::{Phase, Solve};
+use super::solves::{Solver, Solves};
 
 /// What a master computes with.
 pub(super) struct Means<'a> {
@@ -28,27 +29,33 @@ pub(super) struct Means<'a> {
     pub(super) kept: Option<&'a Store>,
 }
 
-/// Solves what is in the queue, one solve after the other, until the master stops.
-pub(super) fn work(solves: &Solves, means: &Means, metrics: &Metrics) {
+/// Solves what is in the queue, one solve after the other, until the master stops. Whatever happens in between, a
+/// solve that was begun ends.
+pub(super) fn work(solves: &Solves, means: &Means, metrics: &Metrics, may_die: impl Fn()) {
+    let solver = Solver::of(solves, metrics);
     let mut freed = Freed::default();
-    while let Some(solve) = solves.next() {
+    while let Some(solve) = solver.next() {
         let span = tracing::info_span!("solve", id = %solve.id);
         let _entered = span.enter();
+        may_die();
         tracing::info!(triangles = solve.triangles, bands = solve.bands, "begins");
         // a fault of the program ends the solve, not the master
-        let ended = catch_unwind(AssertUnwindSafe(|| {
-            means.pool.install(|| end_of(&solve, means, metrics))
-        }));
-        let phase = ended.unwrap_or_else(|_| Phase::Failed("internal fault".to_owned()));
+        let ended = panics::caught(|| means.pool.install(|| end_of(&solve, means, metrics)));
+        let fault = |panic| Phase::Failed(FailureKind::Fault, format!("internal fault: {panic}"));
+        let phase = ended.unwrap_or_else(fault);
         match &phase {
             Phase::Finished(solution) => {
-                tracing::info!(wall_s = solution.summary.wall_s, "finished");
+                let summary = &solution.summary;
+                if !summary.fault.is_empty() {
+                    let fault = summary.fault.as_str();
+                    tracing::warn!(fault, "a finer round failed: the accuracy is missed");
+                }
+                tracing::info!(wall_s = summary.wall_s, "finished");
             }
-            Phase::Failed(reason) => tracing::warn!(reason, "failed"),
+            Phase::Failed(_, reason) => tracing::warn!(reason, "failed"),
             _ => tracing::info!("cancelled"),
         }
-        metrics.ended(&phase);
-        solves.ended(&solve, phase);
+        solve.ends(phase);
         freed.give_back();
     }
 }
@@ -63,8 +70,10 @@ fn end_of(solve: &Solve, means: &Means, metrics: &Metrics) -> Phase {
             metrics.solved(&solution.summary);
             Phase::Finished(Arc::new(solution))
         }
-        Err(Fault::Rounds(RoundsError::Solve(SolveError::Stopped(_)))) => Phase::Cancelled,
-        Err(fault) => Phase::Failed(causes(&fault)),
+        Err(fault) => match fault.kind() {
+            FailureKind::Cancelled => Phase::Cancelled,
+            kind => Phase::Failed(kind, causes(&fault)),
+        },
     }
 }
 
@@ -75,6 +84,15 @@ enum Fault {
     Rounds(#[from] RoundsError),
     #[error("the plan cannot be written down")]
     Json(#[from] serde_json::Error),
+}
+
+impl Fault {
+    fn kind(&self) -> FailureKind {
+        match self {
+            Self::Rounds(error) => error.kind(),
+            Self::Json(_) => FailureKind::Fault,
+        }
+    }
 }
 
 fn solution(solve: &Solve, means: &Means, held: &HeldScene) -> Result<HeldSolution, Fault> {

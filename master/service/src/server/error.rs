@@ -1,8 +1,11 @@
 //! What goes wrong in the service, and how it is said in gRPC.
 
 use std::fmt::Display;
+use std::time::Duration;
 
+use nestrad_proto::RETRY_AFTER;
 use thiserror::Error;
+use tonic::metadata::MetadataMap;
 use tonic::{Code, Status};
 
 /// What kind of thing went wrong.
@@ -46,13 +49,27 @@ pub struct ServiceError {
     pub code: ErrorCode,
     /// What was found where, and what was expected.
     pub message: String,
+    /// When the same call may succeed, if it may at all.
+    pub again_after: Option<Duration>,
 }
 
 impl ServiceError {
     /// An error of this kind.
     pub fn new(code: ErrorCode, message: impl Display) -> Self {
-        let message = message.to_string();
-        Self { code, message }
+        Self {
+            code,
+            message: message.to_string(),
+            again_after: None,
+        }
+    }
+
+    /// The same for what may succeed after a while; says so.
+    #[must_use]
+    pub fn again_after(mut self, wait: Duration) -> Self {
+        let seconds = wait.as_secs_f64().ceil();
+        self.message = format!("{}; try again in {seconds} s", self.message);
+        self.again_after = Some(wait);
+        self
     }
 
     /// Something at `place` in what the caller sent is not what was expected there.
@@ -68,6 +85,11 @@ impl ServiceError {
 
 impl From<ServiceError> for Status {
     fn from(error: ServiceError) -> Self {
-        Self::new(error.code.grpc(), error.message)
+        let mut metadata = MetadataMap::new();
+        if let Some(wait) = error.again_after {
+            let seconds = wait.as_secs_f64().ceil() as u64;
+            metadata.insert(RETRY_AFTER, seconds.into());
+        }
+        Self::with_metadata(error.code.grpc(), error.message, metadata)
     }
 }

@@ -5,7 +5,8 @@ use std::sync::atomic::{AtomicI64, AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-use nestrad_proto::v1;
+use nestrad_proto::connections::Traffic;
+use nestrad_proto::{log, v1};
 use prometheus_client::encoding::EncodeLabelSet;
 use prometheus_client::encoding::text::encode;
 use prometheus_client::metrics::counter::Counter;
@@ -13,7 +14,7 @@ use prometheus_client::metrics::family::Family;
 use prometheus_client::metrics::gauge::Gauge;
 use prometheus_client::registry::Registry;
 
-use super::solves::Phase;
+use super::solve::Phase;
 use nestrad_cluster::ClusterStatus;
 
 /// Rates are means over this time.
@@ -28,8 +29,6 @@ pub struct Metrics {
     segments: Counter,
     rays: Counter,
     stage_s: Family<OfStage, Counter<f64, AtomicU64>>,
-    pub(super) network_bytes: Family<OfDirection, Counter>,
-    pub(super) connections: Gauge,
     held: Held,
     recent: Mutex<VecDeque<TracedJobs>>,
 }
@@ -53,6 +52,10 @@ struct Held {
     block_bytes: Counter,
     memory_bytes: Gauge,
     open_files: Gauge<i64, AtomicI64>,
+    network_bytes: Family<OfDirection, Counter>,
+    connections: Gauge,
+    turned_away: Counter,
+    log_lines_dropped: Counter,
 }
 
 /// What is held at a moment.
@@ -65,6 +68,7 @@ pub(super) struct Now {
     pub(super) scene_bytes: u64,
     pub(super) result_bytes: u64,
     pub(super) workers: ClusterStatus,
+    pub(super) traffic: Traffic,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -90,8 +94,8 @@ struct OfStage {
 }
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
-pub(super) struct OfDirection {
-    pub(super) direction: &'static str,
+struct OfDirection {
+    direction: &'static str,
 }
 
 impl Default for Metrics {
@@ -103,8 +107,6 @@ impl Default for Metrics {
             segments: Counter::default(),
             rays: Counter::default(),
             stage_s: Family::default(),
-            network_bytes: Family::default(),
-            connections: Gauge::default(),
             held: Held::default(),
             recent: Mutex::default(),
         };
@@ -142,9 +144,19 @@ impl Metrics {
         registry.register(
             "network_bytes",
             "Bytes on connections, encryption included",
-            self.network_bytes.clone(),
+            held.network_bytes.clone(),
         );
-        registry.register("connections", "Open connections", self.connections.clone());
+        registry.register("connections", "Open connections", held.connections.clone());
+        registry.register(
+            "connections_turned_away",
+            "Connections that were closed before a call was let in",
+            held.turned_away.clone(),
+        );
+        registry.register(
+            "log_lines_dropped",
+            "Lines of the log that could not be written",
+            held.log_lines_dropped.clone(),
+        );
         registry.register("scenes", "Scenes that are held", held.scenes.clone());
         registry.register(
             "scene_bytes",
@@ -222,7 +234,7 @@ impl Metrics {
     pub(super) fn ended(&self, state: &Phase) {
         let outcome = match state {
             Phase::Finished(_) => "finished",
-            Phase::Failed(_) => "failed",
+            Phase::Failed(..) => "failed",
             Phase::Queued | Phase::Running | Phase::Cancelled => "cancelled",
         };
         self.solves.get_or_create(&OfOutcome { outcome }).inc();
@@ -282,6 +294,8 @@ impl Metrics {
         held.scene_bytes.set(now.scene_bytes as i64);
         held.result_bytes.set(now.result_bytes as i64);
         held.cluster(&now.workers);
+        held.traffic(&now.traffic);
+        set(&held.log_lines_dropped, log::dropped_lines());
         held.memory_bytes.set(resident_bytes().unwrap_or(0));
         held.open_files.set(open_files().unwrap_or(0));
         let mut text = String::new();
@@ -313,9 +327,23 @@ impl Held {
             (&self.row_bytes, now.bytes_in),
             (&self.block_bytes, now.bytes_out),
         ] {
-            counter.inner().store(total, Ordering::Relaxed);
+            set(counter, total);
         }
     }
+
+    fn traffic(&self, now: &Traffic) {
+        self.connections.set(now.open as i64);
+        set(&self.turned_away, now.turned_away);
+        for (direction, total) in [("received", now.received), ("sent", now.sent)] {
+            let of = OfDirection { direction };
+            set(&self.network_bytes.get_or_create(&of), total);
+        }
+    }
+}
+
+/// What is counted elsewhere.
+fn set(counter: &Counter, total: u64) {
+    counter.inner().store(total, Ordering::Relaxed);
 }
 
 /// Memory of this process that is resident now.

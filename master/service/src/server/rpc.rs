@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use nestrad_proto::v1;
 use nestrad_proto::v1::solve_service_server::SolveService;
-use tokio::sync::{Semaphore, mpsc};
+use tokio::sync::mpsc;
 use tokio::time::timeout;
 use tokio_stream::wrappers::ReceiverStream;
 use tokio_stream::{Stream, StreamExt};
@@ -14,22 +14,23 @@ use tonic::{Request, Response, Status, Streaming};
 use v1::scene_header::Geometry;
 use v1::scene_slice::Part;
 
+use super::caller::Caller;
 use super::error::{ErrorCode, ServiceError};
 use super::held::HeldCanopy;
 use super::identity::Id;
-use super::intake::{Upload, lighting, settings};
+use super::intake::{Upload, lighting, organ_bytes, settings, triangle_bytes};
 use super::metrics::Metrics;
 use super::scenes::Scenes;
 use super::slices;
-use super::solves::{Phase, Solve, Solves, stopping};
+use super::solve::{Phase, Solve};
+use super::solves::{Solves, stopping};
+use super::uploads::{Pace, Uploads};
 use nestrad_cluster::Cluster;
 use nestrad_cluster::scheduler::WorkerCounts;
+use nestrad_engine::traced::FailureKind;
 
-/// A client that sends nothing for so long in the middle of a scene is given up.
-const SILENCE: Duration = Duration::from_secs(60);
-
-/// Scenes that are taken in at a time: each may hold a message or two that is not checked yet.
-pub(super) const UPLOADS: usize = 16;
+/// A client that is awaited is looked after so often.
+const LOOK: Duration = Duration::from_secs(1);
 
 /// Watchers are told so often at most.
 const TELL_EVERY: Duration = Duration::from_millis(200);
@@ -40,8 +41,7 @@ pub(super) struct Rpc {
     pub(super) scenes: Arc<Scenes>,
     pub(super) solves: Arc<Solves>,
     pub(super) metrics: Arc<Metrics>,
-    /// Permits for [`UPLOADS`].
-    pub(super) uploads: Semaphore,
+    pub(super) uploads: Uploads,
     pub(super) workers: Cluster,
     pub(super) most_GiB: f64,
     pub(super) started: Instant,
@@ -58,14 +58,10 @@ impl SolveService for Rpc {
         if self.solves.is_stopping() {
             return Err(stopping().into());
         }
-        let full = |_| {
-            let message = "too many uploads at a time: try again";
-            ServiceError::new(ErrorCode::Exhausted, message)
-        };
-        let waited = timeout(SILENCE, self.uploads.acquire()).await;
-        let _permit = waited.map_err(full)?;
+        let caller = Caller::of(&request);
+        let mut pace = Pace::begin(self.uploads.place(caller).await?);
         let mut slices = request.into_inner();
-        let Some(Part::Header(header)) = next(&mut slices).await? else {
+        let Some(Part::Header(header)) = next(&mut slices, &mut pace).await? else {
             let message = "the first slice: expected a header, found something else";
             return Err(ServiceError::new(ErrorCode::Invalid, message).into());
         };
@@ -74,10 +70,13 @@ impl SolveService for Rpc {
                 let upload = Upload::begin(new)?;
                 // what is wrong with the light should not wait for a canopy to arrive
                 let lighting = lighting(&header, upload.surfaces())?;
-                (self.receive(upload, &mut slices).await?, lighting)
+                (
+                    self.receive(caller, upload, &mut slices, &mut pace).await?,
+                    lighting,
+                )
             }
             Some(Geometry::GeometryId(id)) => {
-                if next(&mut slices).await?.is_some() {
+                if next(&mut slices, &mut pace).await?.is_some() {
                     let message = "after a header with a geometry_id: expected nothing more";
                     return Err(ServiceError::new(ErrorCode::Invalid, message).into());
                 }
@@ -91,7 +90,7 @@ impl SolveService for Rpc {
             }
         };
         let of_light = lighting.light.warnings(&lighting.optics.names());
-        let scene = self.scenes.keep_scene(geometry, lighting)?;
+        let scene = self.scenes.keep_scene(caller, geometry, lighting)?;
         let facts = facts(scene.geometry());
         let mut warnings = scene.geometry().inspection.warnings.clone();
         warnings.extend(of_light);
@@ -108,10 +107,11 @@ impl SolveService for Rpc {
         &self,
         request: Request<v1::StartSolveRequest>,
     ) -> Result<Response<v1::StartSolveResponse>, Status> {
+        let caller = Caller::of(&request);
         let request = request.into_inner();
         let settings = settings(&request.options.unwrap_or_default(), self.most_GiB)?;
         let scene = self.scenes.scene(parse(&request.scene_id, "scene_id")?)?;
-        let solve = self.solves.start(scene, settings)?;
+        let solve = self.solves.start(caller, scene, settings)?;
         Ok(Response::new(v1::StartSolveResponse {
             solve_id: solve.id.to_string(),
         }))
@@ -148,10 +148,14 @@ impl SolveService for Rpc {
         let table = v1::ResultTable::try_from(table).unwrap_or_default();
         let slices = slices::of(outcome, table)?;
         solve.is_fetched();
-        let slices = slices.map(move |slice| {
-            solve.is_fetched();
-            Ok(slice)
+        let all = solve.clone();
+        let slices = slices.inspect(move |_| solve.is_fetched());
+        // asked for more after the last slice: it is on its way
+        let end = std::iter::from_fn(move || {
+            all.has_fetched(table);
+            None
         });
+        let slices = slices.chain(end).map(Ok);
         Ok(Response::new(Box::pin(tokio_stream::iter(slices))))
     }
 
@@ -205,33 +209,45 @@ impl SolveService for Rpc {
     }
 }
 
+fn GiB(bytes: u64) -> f64 {
+    bytes as f64 / (1u64 << 30) as f64
+}
+
 fn worker_info(worker: &WorkerCounts) -> v1::WorkerInfo {
     v1::WorkerInfo {
         name: worker.facts.name.clone(),
         threads: worker.facts.threads,
-        memory_gi_b: worker.facts.memory_bytes as f64 / (1u64 << 30) as f64,
+        memory_gi_b: GiB(worker.facts.memory_bytes),
         leased: worker.leased as u32,
         done: worker.done,
         lost: worker.lost,
         silent_s: worker.silent.as_secs_f64(),
+        needs_memory_gi_b: worker.too_small_for.map(GiB),
     }
 }
 
 impl Rpc {
-    /// Takes in a geometry that is not held yet; gives its name.
+    /// Takes in a geometry that is not held yet; gives its name. Room is made for what has come, never for what was
+    /// only announced.
     async fn receive(
         &self,
+        caller: Caller,
         mut upload: Upload,
         slices: &mut Streaming<v1::SceneSlice>,
+        pace: &mut Pace,
     ) -> Result<Id, ServiceError> {
-        let mut memory = self.scenes.reserve(upload.announced_bytes())?;
+        self.scenes.could_hold(upload.announced_bytes())?;
+        let mut memory = self.scenes.reserve(caller, 0)?;
         while !upload.is_complete() {
-            match next(slices).await? {
+            match next(slices, pace).await? {
                 Some(Part::Organs(slice)) => {
-                    let names = upload.organs(slice)?;
-                    memory.join(self.scenes.reserve(names)?);
+                    memory.join(self.scenes.reserve(caller, organ_bytes(&slice))?);
+                    upload.organs(slice)?;
                 }
-                Some(Part::Triangles(slice)) => upload.triangles(&slice)?,
+                Some(Part::Triangles(slice)) => {
+                    memory.join(self.scenes.reserve(caller, triangle_bytes(&slice))?);
+                    upload.triangles(&slice)?;
+                }
                 Some(Part::Header(_)) => {
                     let message = "after the header: expected organs or triangles, found a header";
                     return Err(ServiceError::new(ErrorCode::Invalid, message));
@@ -249,23 +265,33 @@ impl Rpc {
 }
 
 /// The next part of a scene; none at its end.
-async fn next(slices: &mut Streaming<v1::SceneSlice>) -> Result<Option<Part>, ServiceError> {
-    let silent = |_| {
-        let message = format!("expected the next slice within {} s", SILENCE.as_secs());
-        ServiceError::new(ErrorCode::TooLate, message)
+async fn next(
+    slices: &mut Streaming<v1::SceneSlice>,
+    pace: &mut Pace,
+) -> Result<Option<Part>, ServiceError> {
+    let slice = loop {
+        pace.check()?;
+        if let Ok(slice) = timeout(LOOK, slices.next()).await {
+            break slice;
+        }
     };
-    let slice = timeout(SILENCE, slices.next()).await.map_err(silent)?;
     let slice = slice.transpose().map_err(|status| {
         // an encoding that cannot be read, a message that is too large, a client that is gone
         ServiceError::new(ErrorCode::Invalid, status.message())
     })?;
-    match slice.map(|slice| slice.part) {
+    let part = match slice.map(|slice| slice.part) {
         Some(None) => {
             let message = "slice: expected organs or triangles, found nothing";
-            Err(ServiceError::new(ErrorCode::Invalid, message))
+            return Err(ServiceError::new(ErrorCode::Invalid, message));
         }
-        part => Ok(part.flatten()),
-    }
+        part => part.flatten(),
+    };
+    pace.arrived(match &part {
+        Some(Part::Organs(slice)) => organ_bytes(slice),
+        Some(Part::Triangles(slice)) => triangle_bytes(slice),
+        Some(Part::Header(_)) | None => 0,
+    });
+    Ok(part)
 }
 
 /// Tells a watcher how a solve goes on, until it has ended or nobody listens.
@@ -291,8 +317,12 @@ async fn tell(
             total: stage.total,
             plan: Vec::new(),
             reason: match &state {
-                Phase::Failed(reason) => reason.clone(),
+                Phase::Failed(_, reason) => reason.clone(),
                 _ => String::new(),
+            },
+            failure: match &state {
+                Phase::Failed(kind, _) => failure(*kind).into(),
+                _ => v1::SolveFailure::Unspecified.into(),
             },
         };
         if !told_plan {
@@ -308,6 +338,9 @@ async fn tell(
                 return;
             }
         }
+        if matches!(state, Phase::Failed(..)) {
+            solve.is_told();
+        }
         if state.has_ended() {
             return;
         }
@@ -320,6 +353,16 @@ async fn tell(
             () = tokio::time::sleep(TELL_EVERY) => {}
             () = watcher.closed() => return,
         }
+    }
+}
+
+fn failure(kind: FailureKind) -> v1::SolveFailure {
+    match kind {
+        FailureKind::Input => v1::SolveFailure::Input,
+        FailureKind::Limit => v1::SolveFailure::Limit,
+        FailureKind::Fault => v1::SolveFailure::Fault,
+        // told as a state of its own
+        FailureKind::Cancelled => v1::SolveFailure::Unspecified,
     }
 }
 

@@ -5,27 +5,31 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use axum::Router;
-use axum::http::header::CONTENT_TYPE;
+use axum::http::header::{CONNECTION, CONTENT_TYPE};
 use axum::routing::get;
 use nestrad_cluster::store::Store;
 use nestrad_cluster::{Cluster, WorkerLimits, worker_service};
-use nestrad_proto::access::{Access, AccessError};
+use nestrad_proto::access::GuardedServer;
+use nestrad_proto::connections::Connections;
 use nestrad_proto::v1::solve_service_server::SolveServiceServer;
 use nestrad_proto::{DESCRIPTORS, MAX_MESSAGE_BYTES};
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 use thiserror::Error;
 use tokio::net::TcpListener;
-use tokio::sync::Semaphore;
 use tokio::time::{sleep, timeout};
 use tonic_health::server::HealthReporter;
 
+use super::admission::Bounds;
 use super::compute::{self, Means};
-use super::connection::incoming;
 use super::limits::ServiceLimits;
 use super::metrics::{Metrics, Now};
-use super::rpc::{Rpc, UPLOADS};
+use super::metrics_port::MetricsPort;
+use super::rpc::Rpc;
 use super::scenes::Scenes;
-use super::solves::{Phase, Solves};
+use super::solve::Phase;
+use super::solves::Solves;
+use super::supervisor::{Fault, Supervisor};
+use super::uploads::Uploads;
 
 /// Time for clients to come for what has just finished, and to hang up, when the master stops.
 const FAREWELL: Duration = Duration::from_secs(5);
@@ -40,15 +44,20 @@ pub struct Service {
     pool: Arc<ThreadPool>,
     workers: Cluster,
     kept: Option<Store>,
+    connections: Connections,
+    supervisor: Supervisor,
     started: Instant,
 }
+
+/// The task that looks after the workers.
+const WATCH: &str = "watch";
+
+/// The task that gives out metrics.
+const METRICS: &str = "metrics";
 
 /// Why a master does not serve.
 #[derive(Debug, Error)]
 pub enum ServeError {
-    /// It may not listen there, or has no credentials.
-    #[error(transparent)]
-    Access(#[from] AccessError),
     /// Threads cannot be started.
     #[error("cannot start threads")]
     Threads(#[from] ThreadPoolBuildError),
@@ -61,43 +70,55 @@ pub enum ServeError {
     /// The server failed.
     #[error("cannot serve")]
     Transport(#[from] tonic::transport::Error),
+    /// It stopped because a part of it had ended.
+    #[error(transparent)]
+    Fault(#[from] Fault),
 }
 
 impl Service {
-    /// A master that computes with so many threads, 0 for one per processor, as long as there are no
-    /// workers. To be called within a tokio runtime.
+    /// A master that computes with so many threads as long as there are no workers. To be called within a tokio
+    /// runtime.
     pub fn new(
         limits: ServiceLimits,
         workers: WorkerLimits,
         kept: Option<Store>,
         threads: usize,
+        connections: Connections,
     ) -> Result<Self, ServeError> {
         let named = |k| format!("compute-{k}");
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
             .thread_name(named)
             .build()?;
+        let bounds = Bounds {
+            queue: limits.queue,
+            result_bytes: limits.result_bytes,
+            scene_bytes: limits.scene_bytes,
+        };
+        let (workers, supervisor) = (Cluster::new(workers, threads)?, Supervisor::default());
+        supervisor.task(WATCH, workers.keep_watch());
         Ok(Self {
             limits,
             scenes: Arc::new(Scenes::new(limits.scene_bytes)),
-            solves: Arc::new(Solves::new(limits.queue, limits.result_bytes)),
+            solves: Arc::new(Solves::new(bounds, limits.solves.max(1))),
             metrics: Arc::default(),
             pool: Arc::new(pool),
-            workers: Cluster::start(workers, threads)?,
+            workers,
             kept,
+            connections,
+            supervisor,
             started: Instant::now(),
         })
     }
 
-    /// Serves until `shutdown` comes, and then until what is being computed is done and fetched, or the
-    /// time for that is over.
+    /// Serves the connections that it was made with until `shutdown` comes, or a part of the master ends; and then until what is being computed is done and
+    /// fetched, or the time for that is over.
     pub async fn run(
         &self,
         listener: TcpListener,
-        access: &Access,
+        mut server: GuardedServer,
         shutdown: impl Future<Output = ()> + Send + 'static,
     ) -> Result<(), ServeError> {
-        let mut server = access.server(listener.local_addr()?)?;
         let reflection = || {
             tonic_reflection::server::Builder::configure()
                 .register_encoded_file_descriptor_set(DESCRIPTORS)
@@ -110,7 +131,7 @@ impl Service {
             scenes: self.scenes.clone(),
             solves: self.solves.clone(),
             metrics: self.metrics.clone(),
-            uploads: Semaphore::new(UPLOADS),
+            uploads: Uploads::new(),
             workers: self.workers.clone(),
             most_GiB: self.limits.solve_GiB,
             started: self.started,
@@ -121,17 +142,21 @@ impl Service {
         let drained = Arc::new(tokio::sync::Notify::new());
         let (this, told) = (self.clone(), drained.clone());
         let drain = async move {
-            shutdown.await;
+            tokio::select! {
+                () = shutdown => {}
+                fault = this.supervisor.first_fault() => this.give_up(&fault),
+            }
             this.drain(&health).await;
             told.notify_one();
         };
+        tracing::info!(address = %listener.local_addr()?, "serves");
         let serving = server
             .add_service(health_service)
             .add_service(reflection().build_v1()?)
             .add_service(reflection().build_v1alpha()?)
             .add_service(clients)
             .add_service(worker_service(self.workers.clone()))
-            .serve_with_incoming_shutdown(incoming(listener, self.metrics.clone()), drain);
+            .serve_with_incoming_shutdown(self.connections.incoming(listener), drain);
         // who does not hang up is left behind
         let patience = async {
             drained.notified().await;
@@ -141,27 +166,37 @@ impl Service {
             served = serving => served?,
             () = patience => {}
         }
-        Ok(())
+        self.supervisor
+            .fault()
+            .map_or(Ok(()), |fault| Err(fault.into()))
     }
 
     fn start_computing(&self) -> io::Result<()> {
         for k in 0..self.limits.solves.max(1) {
-            let this = self.clone();
-            std::thread::Builder::new()
-                .name(format!("solve-{k}"))
-                .spawn(move || this.compute())?;
+            let (this, part) = (self.clone(), format!("solve-{k}"));
+            let run = move || this.compute(k);
+            self.supervisor.thread(part, run)?;
         }
         Ok(())
     }
 
     /// Solves one after the other, until the master stops.
-    fn compute(&self) {
+    fn compute(&self, k: usize) {
         let means = Means {
             pool: &self.pool,
             workers: &self.workers,
             kept: self.kept.as_ref(),
         };
-        compute::work(&self.solves, &means, &self.metrics);
+        let may_die = || self.supervisor.may_die(&format!("solve-{k}"));
+        compute::work(&self.solves, &means, &self.metrics, may_die);
+    }
+
+    /// Does without what has ended.
+    fn give_up(&self, fault: &Fault) {
+        // overdue leases are not taken back: the master computes by itself
+        if fault.part == WATCH {
+            self.workers.desert(&fault.to_string());
+        }
     }
 
     /// Takes on nothing new, and waits for the rest.
@@ -190,6 +225,19 @@ impl Service {
         let _ = timeout(limit + FAREWELL, quiet).await;
     }
 
+    /// Serves the metrics as Prometheus reads them, at `/metrics`, one answer a connection.
+    pub fn serve_metrics(&self, listener: TcpListener) {
+        const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
+        let this = self.clone();
+        let answer = move || {
+            let text = this.metrics_text();
+            async move { ([(CONTENT_TYPE, OPEN_METRICS), (CONNECTION, "close")], text) }
+        };
+        let port = MetricsPort::new(listener);
+        let serving = axum::serve(port, Router::new().route("/metrics", get(answer)));
+        self.supervisor.task(METRICS, serving.into_future());
+    }
+
     fn metrics_text(&self) -> String {
         let solves = self.solves.all();
         let count =
@@ -202,6 +250,7 @@ impl Service {
             scene_bytes: self.scenes.bytes(),
             result_bytes: self.solves.result_bytes(),
             workers: self.workers.status(),
+            traffic: self.connections.traffic(),
         })
     }
 }
@@ -213,12 +262,6 @@ async fn until(done: impl Fn() -> bool) {
     }
 }
 
-/// Serves the metrics of a master as Prometheus reads them, at `/metrics`.
-pub async fn serve_metrics(listener: TcpListener, service: Service) -> io::Result<()> {
-    const OPEN_METRICS: &str = "application/openmetrics-text; version=1.0.0; charset=utf-8";
-    let answer = move || {
-        let text = service.metrics_text();
-        async move { ([(CONTENT_TYPE, OPEN_METRICS)], text) }
-    };
-    axum::serve(listener, Router::new().route("/metrics", get(answer))).await
-}
+#[cfg(test)]
+#[path = "serve_tests.rs"]
+mod tests;

@@ -32,7 +32,12 @@ impl HeldSolution {
     ) -> Result<Self, serde_json::Error> {
         let canopy = &scene.geometry().canopy;
         let plan_json = serde_json::to_string(&solved.plan_record())?;
-        let Solved { solution, work, .. } = solved;
+        let Solved {
+            solution,
+            work,
+            accuracy,
+            ..
+        } = solved;
         let errors = organ_spread(&canopy.plants(), &solution);
         let bands = solution.balance.iter().zip(errors);
         let bands = bands.map(|(balance, error)| v1::BandSummary {
@@ -67,6 +72,7 @@ impl HeldSolution {
             jobs_traced: work.jobs.traced,
             jobs_kept: work.jobs.kept,
             sources: work.sources as u64,
+            fault: accuracy.failure.unwrap_or_default(),
         };
         Ok(Self {
             bands: scene

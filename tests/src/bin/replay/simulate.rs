@@ -114,7 +114,8 @@ pub(crate) fn simulate(recorded: &Recorded, setting: Setting) -> Run {
             Duration::ZERO,
             WorkerFacts {
                 name: String::new(),
-                identity: "".into(),
+                identity: [0; 32],
+                who: "".into(),
                 threads: setting.threads_each,
                 memory_bytes: 1 << 40,
             },

@@ -62,18 +62,12 @@ struct Share<'a> {
     in_a_row_m: f64,
 }
 
-/// Up to so many lines in a row are as good as lines here and there.
-const IN_A_ROW: f64 = 4.0;
-
 impl<'a> Share<'a> {
     fn of(rays: &'a Rays, batch: &Batch) -> Self {
         Self {
             rays,
             batch: batch.index,
-            in_a_row_m: match batch.lines.first() {
-                Some(lines) => IN_A_ROW * lines.line_area_m2.sqrt(),
-                None => f64::INFINITY,
-            },
+            in_a_row_m: batch.lines_in_a_row_m(),
         }
     }
 
@@ -83,12 +77,9 @@ impl<'a> Share<'a> {
     }
 
     /// Rays in this batch for a face of that area and that longest edge: those of the half are dealt out in
-    /// turn. What is long is met by many lines of a lattice at a time, if by any: these are one sample.
+    /// turn.
     fn rays_of(&self, area_m2: f64, longest_m: f64, face: u32) -> u32 {
-        let at_a_time = (longest_m / self.in_a_row_m).max(1.0);
-        let missing = (self.rays.least_samples - area_m2 * self.rays.lines_per_m2 / at_a_time)
-            .ceil()
-            .max(0.0) as u32;
+        let missing = self.rays.of_half(area_m2, longest_m, self.in_a_row_m);
         let batches = self.rays.batches_in_half.max(1);
         let turn = (self.batch % batches + face % batches) % batches;
         missing / batches + u32::from(turn < missing % batches)

@@ -5,17 +5,17 @@ use std::fmt::Display;
 use std::sync::Arc;
 
 use glam::DVec3;
-use nestrad_common::canopy::Kind;
+use nestrad_common::canopy::{Kind, MAX_NAME_BYTES};
 use nestrad_common::formats::pattern::{MIN_SIDE, Rectangle};
 use nestrad_common::light::sky::Radiance;
 use nestrad_common::light::{
     AN_IRRADIANCE, Light, MIN_DESCENT, POINTS_DOWN, SkyLight, Source, is_irradiance,
 };
-use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
+use nestrad_common::optics::{AN_ALBEDO, Band, FaceOptics, LeafOptics, Optics, is_albedo};
 use nestrad_proto::v1;
 use nestrad_proto::v1::scene_material::Kind as Sent;
 
-use super::{MAX_NAME_BYTES, ServiceError, Surface};
+use super::{ErrorCode, ServiceError, Surface};
 use crate::server::held::Lighting;
 
 const MAX_BANDS: usize = 256;
@@ -61,6 +61,11 @@ pub(in crate::server) fn lighting(
             .map(|given| self::sky(given, bands.len()))
             .transpose()?,
     };
+    // what is checked above is said with its place; this is what files are held to
+    let names = checked.iter().map(|band| band.name.as_str());
+    light
+        .check(names)
+        .map_err(|error| ServiceError::new(ErrorCode::Invalid, error))?;
     Ok(Lighting {
         optics: Arc::new(Optics { bands: checked }),
         light: Arc::new(light),
@@ -69,9 +74,9 @@ pub(in crate::server) fn lighting(
 
 fn band(b: usize, given: &v1::BandOptics, surfaces: &[Surface]) -> Result<Band, ServiceError> {
     let soil_albedo = given.soil_albedo;
-    if !(0.0..=1.0).contains(&soil_albedo) {
+    if !is_albedo(soil_albedo) {
         let place = format_args!("bands[{b}].soil_albedo");
-        return Err(ServiceError::invalid(place, "0 to 1", soil_albedo));
+        return Err(ServiceError::invalid(place, AN_ALBEDO, soil_albedo));
     }
     if given.materials.len() != surfaces.len() {
         let place = format_args!("bands[{b}].materials");

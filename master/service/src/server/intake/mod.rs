@@ -29,8 +29,19 @@ pub(super) use surface::{Surface, sent};
 const TRIANGLE_BYTES: u64 = 88;
 const ORGAN_BYTES: u64 = 176;
 
-/// Longest name of an organ, plant, material or band, bytes.
-const MAX_NAME_BYTES: usize = 4096;
+/// Bytes that triangles take while they are held.
+pub(super) fn triangle_bytes(slice: &v1::TriangleSlice) -> u64 {
+    let count = slice.organ.len().max(slice.vertices_m.len() / 9);
+    TRIANGLE_BYTES * count as u64
+}
+
+/// Bytes that organs take while they are held.
+pub(super) fn organ_bytes(slice: &v1::OrganSlice) -> u64 {
+    let names = slice.id.iter().chain(&slice.plant).chain(&slice.species);
+    let text: usize = names.map(String::len).sum();
+    // names are held twice, to know those that come again
+    ORGAN_BYTES * slice.id.len() as u64 + 2 * text as u64
+}
 
 /// A geometry that is arriving.
 #[derive(Debug)]
@@ -83,8 +94,8 @@ impl Upload {
         TRIANGLE_BYTES * self.triangles as u64 + ORGAN_BYTES * self.organs as u64
     }
 
-    /// Takes in organs; gives the bytes of their names.
-    pub(super) fn organs(&mut self, slice: v1::OrganSlice) -> Result<u64, ServiceError> {
+    /// Takes in organs.
+    pub(super) fn organs(&mut self, slice: v1::OrganSlice) -> Result<(), ServiceError> {
         let got = self.arrived.organs.len();
         let expected = Span {
             list: "organs",
@@ -98,7 +109,6 @@ impl Upload {
         }
         let columns = [("plant", slice.plant.len()), ("species", species.len())];
         expected.check(count, &columns)?;
-        let mut bytes = 0;
         let names = slice.id.into_iter().zip(slice.plant).zip(species);
         for (index, ((id, plant), species)) in (got..).zip(names) {
             for (name, text) in [("id", &id), ("plant", &plant), ("species", &species)] {
@@ -106,7 +116,6 @@ impl Upload {
                     checks::name(format_args!("organs[{index}].{name}"), text)?;
                 }
             }
-            bytes += (id.len() + plant.len() + species.len()) as u64;
             let organ = Organ { species, plant, id };
             self.hasher.organ(&organ);
             if !self.known.insert(organ.clone()) {
@@ -116,8 +125,7 @@ impl Upload {
             }
             self.arrived.organs.push(organ);
         }
-        // names are held here and in `known`
-        Ok(2 * bytes)
+        Ok(())
     }
 
     /// Takes in triangles.

@@ -1,6 +1,6 @@
 //! How a client wants its solve.
 
-use nestrad_common::options::Diameter;
+use nestrad_common::options::{self, DIAMETERS, Diameter};
 use nestrad_proto::v1;
 
 use super::ServiceError;
@@ -12,25 +12,20 @@ pub(in crate::server) fn settings(
     most_GiB: f64,
 ) -> Result<Settings, ServiceError> {
     let default = Settings::default();
-    let above_zero = |name: &str, value: Option<f64>, default: f64| match value {
-        None => Ok(default),
-        Some(value) if value.is_finite() && value > 0.0 => Ok(value),
-        Some(value) => Err(ServiceError::invalid(
-            format_args!("options.{name}"),
-            "a number above 0",
-            value,
-        )),
+    let above_zero = |name: &'static str, value: f64| {
+        options::above_zero(name, value).map_err(|fault| {
+            let place = format_args!("options.{name}");
+            ServiceError::invalid(place, fault.expected, fault.found)
+        })
     };
     let diameter = match given.diameter_m {
         None => Diameter::Auto,
-        Some(f64::INFINITY) => Diameter::Infinite,
-        Some(metres) => Diameter::Metres(above_zero("diameter_m", Some(metres), metres)?),
+        Some(metres) => Diameter::metres(metres)
+            .ok_or_else(|| ServiceError::invalid("options.diameter_m", DIAMETERS, metres))?,
     };
-    let memory_GiB = above_zero(
-        "memory_GiB",
-        given.memory_gi_b,
-        default.memory_GiB.min(most_GiB),
-    )?;
+    let memory_GiB = given.memory_gi_b;
+    let memory_GiB = memory_GiB.unwrap_or(default.memory_GiB.min(most_GiB));
+    let memory_GiB = above_zero("memory_GiB", memory_GiB)?;
     if memory_GiB > most_GiB {
         let wanted = format_args!("at most {most_GiB}, the limit of this master");
         return Err(ServiceError::invalid(
@@ -53,12 +48,15 @@ pub(in crate::server) fn settings(
     let accuracy = given.accuracy_percent;
     Ok(Settings {
         diameter,
-        accuracy_percent: above_zero("accuracy_percent", accuracy, default.accuracy_percent)?,
+        accuracy_percent: above_zero(
+            "accuracy_percent",
+            accuracy.unwrap_or(default.accuracy_percent),
+        )?,
         in_rounds: accuracy.or(given.budget_s).is_some(),
-        budget_s: match given.budget_s {
-            Some(_) => Some(above_zero("budget_s", given.budget_s, 0.0)?),
-            None => None,
-        },
+        budget_s: given
+            .budget_s
+            .map(|budget_s| above_zero("budget_s", budget_s))
+            .transpose()?,
         memory_GiB,
         seed: given.seed.unwrap_or(default.seed),
         estimator,

@@ -79,7 +79,7 @@ fn light_that_cannot_be_is_refused() {
         (with(|b, _| b[0].name.clear()), "bands[0].name"),
         (
             with(|b, _| b[0].soil_albedo = 1.1),
-            "bands[0].soil_albedo: expected 0 to 1",
+            "bands[0].soil_albedo: expected an albedo from 0 to 1",
         ),
         (with(|b, _| b[0].soil_albedo = f64::NAN), "found NaN"),
         (

@@ -1,0 +1,71 @@
+//! The finest plan that fits: where memory is short, what takes it is coarser than what was asked for.
+
+use super::{Aims, Plan, PlanError, Scale, Settings, asked};
+use crate::lit_canopy::LitCanopy;
+
+/// No plan is coarser than what is asked for by more than this.
+const COARSEST: f64 = 200.0;
+
+/// Halvings of the way down: to half a per cent of the error that is planned for.
+const HALVINGS: usize = 10;
+
+impl Plan {
+    /// For the accuracy of the settings, or as near to it as memory allows.
+    pub fn fitting(lit: &LitCanopy, settings: &Settings) -> Result<Self, PlanError> {
+        let scale = Scale::of(lit.canopy);
+        let aims = asked(lit.canopy, settings, &scale);
+        Self::fitting_of(lit, settings, &aims, scale)
+    }
+
+    /// For these aims, or as near to them as memory allows.
+    pub fn fitting_aims(
+        lit: &LitCanopy,
+        settings: &Settings,
+        aims: &Aims,
+    ) -> Result<Self, PlanError> {
+        Self::fitting_of(lit, settings, aims, Scale::of(lit.canopy))
+    }
+
+    fn fitting_of(
+        lit: &LitCanopy,
+        settings: &Settings,
+        aims: &Aims,
+        scale: Scale,
+    ) -> Result<Self, PlanError> {
+        match Self::of_scale(lit, settings, aims, scale) {
+            Err(error) if error.is_of_size() => {}
+            done => return done,
+        }
+        let coarser = |factor: f64| Self::of_scale(lit, settings, &aims.coarser(factor), scale);
+        finest(COARSEST, coarser)
+    }
+
+    /// Whether something is coarser than it would be if no limit were short.
+    pub fn is_limited(&self) -> bool {
+        self.aims.thin
+    }
+}
+
+impl PlanError {
+    /// Whether a coarser plan may do.
+    pub fn is_of_size(&self) -> bool {
+        matches!(self, Self::Memory { .. } | Self::Elements { .. })
+    }
+}
+
+/// The plan of the smallest factor, from 1 to `most`, that is not too large. Larger factors are taken to give smaller
+/// plans.
+fn finest(most: f64, coarser: impl Fn(f64) -> Result<Plan, PlanError>) -> Result<Plan, PlanError> {
+    let (mut low, mut high) = (0.0, 1.0);
+    let at = |part: f64| coarser(most.powf(part));
+    let mut best = at(high)?;
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        match at(middle) {
+            Ok(plan) => (best, high) = (plan, middle),
+            Err(error) if error.is_of_size() => low = middle,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(best)
+}

@@ -1,0 +1,127 @@
+//! A canopy that stays: what was traced of it serves one light after the other.
+
+use std::sync::Arc;
+
+use nestrad_common::canopy::Canopy;
+
+use crate::direct::KeptDirections;
+use crate::exchange::{JobCounts, RowSource};
+use crate::lit_canopy::LitCanopy;
+use crate::plan::{Aims, Plan, Settings, TracePlan};
+use crate::run::Run;
+use crate::solution::Solution;
+use crate::stopwatch::Stopwatch;
+use crate::traced::{SolveError, TracedCanopy, WorkDone, solve_and_keep};
+
+/// Room for one canopy. What is resident saves time and changes no result: a light gives the same bits as it does
+/// alone by the same plan.
+pub struct Resident {
+    most_bytes: u64,
+    keeps_directions: bool,
+    held: Option<Held>,
+}
+
+const GIB: f64 = (1u64 << 30) as f64;
+
+/// A canopy, and how it was traced.
+struct Held {
+    canopy: Arc<Canopy>,
+    settings: Settings,
+    plan: TracePlan,
+    aims: Aims,
+    traced: TracedCanopy,
+}
+
+impl Resident {
+    /// Holds a canopy that takes so many bytes at most, directions of light included.
+    pub fn within(most_bytes: u64) -> Self {
+        Self {
+            most_bytes,
+            keeps_directions: true,
+            held: None,
+        }
+    }
+
+    /// Holds a canopy from one round to the next, which may need finer light alone.
+    pub(crate) fn between_rounds() -> Self {
+        Self {
+            most_bytes: u64::MAX,
+            keeps_directions: false,
+            held: None,
+        }
+    }
+
+    /// Lets go of what is held.
+    pub(crate) fn forget(&mut self) {
+        self.held = None;
+    }
+
+    /// Bytes that are held.
+    pub fn bytes(&self) -> u64 {
+        self.held.as_ref().map_or(0, |held| held.traced.bytes())
+    }
+
+    /// How the canopy was traced and for what, if it is resident and was traced as these settings have it.
+    pub fn traced_for(
+        &self,
+        canopy: &Arc<Canopy>,
+        settings: &Settings,
+    ) -> Option<(&TracePlan, &Aims)> {
+        let held = self.held.as_ref()?;
+        let own = Settings {
+            budget_s: settings.budget_s,
+            memory_GiB: settings.memory_GiB,
+            ..held.settings
+        };
+        let fits = is_same(&held.canopy, canopy) && own == *settings;
+        fits.then_some((&held.plan, &held.aims))
+    }
+
+    /// Lights a canopy as planned, and traces it where it is not resident, or was traced by another plan.
+    pub(crate) fn solve(
+        &mut self,
+        (canopy, settings): (&Arc<Canopy>, &Settings),
+        (lit, plan): (&LitCanopy, &Plan),
+        rows: &dyn RowSource,
+        run: &Run,
+        watch: &mut Stopwatch,
+    ) -> Result<(Solution, WorkDone), SolveError> {
+        let fits = |held: &Held| is_same(&held.canopy, canopy) && held.plan == plan.trace;
+        if let Some(held) = self.held.as_ref().filter(|held| fits(held)) {
+            let (optics, sources) = (lit.optics, lit.sources);
+            let lit = held
+                .traced
+                .lit_watched(optics, sources, &plan.light, run, watch);
+            let (solution, mut work) = lit?;
+            work.jobs = JobCounts {
+                traced: 0,
+                kept: work.jobs.traced + work.jobs.kept,
+            };
+            return Ok((solution, work));
+        }
+        // there is not to be room for two
+        self.held = None;
+        let directions = if self.keeps_directions {
+            let of_canopy = GIB * (plan.memory.scene_GiB + plan.memory.rows_GiB);
+            KeptDirections::within(self.most_bytes.saturating_sub(of_canopy as u64))
+        } else {
+            KeptDirections::default()
+        };
+        let (solution, work, traced) = solve_and_keep(lit, plan, (rows, run, watch), directions)?;
+        if traced.bytes() <= self.most_bytes {
+            self.held = Some(Held {
+                canopy: canopy.clone(),
+                settings: *settings,
+                plan: plan.trace.clone(),
+                aims: plan.aims,
+                traced,
+            });
+        }
+        Ok((solution, work))
+    }
+}
+
+/// A canopy that was sent or read again is the same one.
+fn is_same(a: &Arc<Canopy>, b: &Arc<Canopy>) -> bool {
+    Arc::ptr_eq(a, b) || a == b
+}

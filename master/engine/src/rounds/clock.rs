@@ -1,0 +1,133 @@
+//! How much time there is, how fast this machine is, and an alarm.
+
+use std::sync::mpsc::{self, RecvTimeoutError, Sender};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+use super::work::all_s;
+use crate::lit_canopy::LitCanopy;
+use crate::plan::Plan;
+use crate::stop::Stop;
+
+/// How much time there is, and how fast this machine is.
+pub(super) struct Clock {
+    begun: Instant,
+    budget_s: f64,
+    /// What a second takes here that is reckoned for one core, s.
+    slower: f64,
+}
+
+/// A round is planned to take this part of the time that is left at most: what it takes is not known better.
+const SAFE: f64 = 0.85;
+
+/// The first one this part, because this machine is not known yet.
+const SAFE_AT_FIRST: f64 = 0.4;
+
+/// What the first round may overrun the budget by: parts of it, or seconds where that is more.
+const OVERRUN: f64 = 0.08;
+const OVERRUN_S: f64 = 0.35;
+
+impl Clock {
+    pub(super) fn start(budget_s: f64) -> Self {
+        Self {
+            begun: Instant::now(),
+            budget_s,
+            slower: 1.0 / rayon::current_num_threads() as f64,
+        }
+    }
+
+    fn left_s(&self) -> f64 {
+        self.budget_s - self.begun.elapsed().as_secs_f64()
+    }
+
+    pub(super) fn is_over(&self) -> bool {
+        self.left_s() <= 0.0
+    }
+
+    /// What a plan should take, s.
+    pub(super) fn takes_s(&self, lit: &LitCanopy, plan: &Plan) -> f64 {
+        self.slower * all_s(lit, plan)
+    }
+
+    /// Whether a plan should be done in time.
+    pub(super) fn allows(&self, lit: &LitCanopy, plan: &Plan) -> bool {
+        self.takes_s(lit, plan) <= SAFE * self.left_s()
+    }
+
+    /// Whether a first plan leaves time for another.
+    pub(super) fn allows_first(&self, lit: &LitCanopy, plan: &Plan) -> bool {
+        self.takes_s(lit, plan) <= SAFE_AT_FIRST * self.left_s()
+    }
+
+    /// Whether a first plan that cannot be coarser should be done in time.
+    pub(super) fn allows_coarsest(&self, lit: &LitCanopy, plan: &Plan) -> bool {
+        self.takes_s(lit, plan) <= self.left_s()
+    }
+
+    /// Learns from a round what this machine takes.
+    pub(super) fn learn(&mut self, lit: &LitCanopy, plan: &Plan, took_s: f64) {
+        self.slower = took_s / all_s(lit, plan).max(f64::MIN_POSITIVE);
+    }
+
+    /// Stops a round that is not done in time; the first one, without which there is nothing, a bit later.
+    pub(super) fn alarm(&self, is_first: bool, stop: &Stop) -> Option<Alarm> {
+        let more_s = if is_first {
+            (OVERRUN * self.budget_s).max(OVERRUN_S)
+        } else {
+            0.0
+        };
+        let left = Duration::try_from_secs_f64((self.left_s() + more_s).max(0.0)).ok()?;
+        Alarm::in_time(left, stop)
+    }
+}
+
+/// Stops some work when its time is up; dropped before that, it does not.
+pub(super) struct Alarm {
+    off: Option<Sender<()>>,
+    waiting: Option<JoinHandle<()>>,
+}
+
+impl Alarm {
+    fn in_time(left: Duration, stop: &Stop) -> Option<Self> {
+        let (off, is_off) = mpsc::channel::<()>();
+        let stop = stop.clone();
+        let wait = move || {
+            if let Err(RecvTimeoutError::Timeout) = is_off.recv_timeout(left) {
+                stop.stop();
+            }
+        };
+        // without a thread to spare, time is as it was planned
+        let waiting = thread::Builder::new().spawn(wait).ok()?;
+        Some(Self {
+            off: Some(off),
+            waiting: Some(waiting),
+        })
+    }
+}
+
+impl Drop for Alarm {
+    fn drop(&mut self) {
+        drop(self.off.take());
+        if let Some(waiting) = self.waiting.take() {
+            // it does not panic
+            let _ = waiting.join();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_alarm_stops_what_is_late_and_nothing_else() {
+        let (late, early) = (Stop::default(), Stop::default());
+        let alarm = Alarm::in_time(Duration::from_millis(1), &late).unwrap();
+        while late.check().is_ok() {
+            thread::yield_now();
+        }
+        drop(alarm);
+        drop(Alarm::in_time(Duration::from_secs(3600), &early));
+        assert!(early.check().is_ok());
+    }
+}

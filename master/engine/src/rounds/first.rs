@@ -1,0 +1,88 @@
+//! The first round: what is asked for, or a coarse look where that saves; or the best that memory and time allow.
+
+use nestrad_common::scene::Scene;
+
+use super::clock::Clock;
+use super::limits::Planned;
+use super::work::work_s;
+use super::{lit_canopy, sources_for};
+use crate::plan::{Aims, Plan, PlanError, Settings, WorkCounts};
+
+/// A coarse look comes first where it takes less than this part of what is planned without one.
+const WORTH_A_LOOK: f64 = 0.2;
+
+/// The plan of the first round, with its sources.
+pub(super) fn first(
+    scene: &Scene,
+    settings: &Settings,
+    clock: Option<&Clock>,
+) -> Result<Planned, PlanError> {
+    if let Some(clock) = clock {
+        return in_time(scene, settings, clock);
+    }
+    let aims = Aims::of(settings.accuracy_percent);
+    let sources = sources_for(scene, &aims, settings);
+    let plan = Plan::fitting(&lit_canopy(scene, &sources), settings);
+    if !settings.in_rounds {
+        return Ok((sources, plan?));
+    }
+    let aims = Aims::pilot(settings.accuracy_percent);
+    let coarse = sources_for(scene, &aims, settings);
+    let look = Plan::aimed(&lit_canopy(scene, &coarse), settings, &aims);
+    let all_s = |sources, plan| {
+        let counts = WorkCounts::of(&lit_canopy(scene, sources), plan);
+        work_s(&counts).iter().sum::<f64>()
+    };
+    match (plan, look) {
+        // it may not need as much as it was planned with
+        (Ok(plan), Ok(look)) if all_s(&coarse, &look) < WORTH_A_LOOK * all_s(&sources, &plan) => {
+            Ok((coarse, look))
+        }
+        (plan, _) => Ok((sources, plan?)),
+    }
+}
+
+/// Where time is short, a coarse look comes first always; where not even that leaves time for more, a coarser one.
+fn in_time(scene: &Scene, settings: &Settings, clock: &Clock) -> Result<Planned, PlanError> {
+    let pilot = Aims::pilot(settings.accuracy_percent);
+    let planned = |aims: &Aims| {
+        let sources = sources_for(scene, aims, settings);
+        let plan = Plan::fitting_aims(&lit_canopy(scene, &sources), settings, aims)?;
+        Ok::<Planned, PlanError>((sources, plan))
+    };
+    let allows = |(sources, plan): &Planned| clock.allows_first(&lit_canopy(scene, sources), plan);
+    let look = planned(&pilot)?;
+    if allows(&look) {
+        return Ok(look);
+    }
+    let mut best = planned(&pilot.quicker(QUICKEST))?;
+    if !allows(&best) {
+        let (sources, plan) = &best;
+        let lit = lit_canopy(scene, sources);
+        return if clock.allows_coarsest(&lit, plan) {
+            Ok(best)
+        } else {
+            Err(PlanError::Time {
+                needed_s: clock.takes_s(&lit, plan),
+                limit_s: settings.budget_s.unwrap_or_default(),
+            })
+        };
+    }
+    let (mut low, mut high) = (0.0, 1.0);
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        let tried = planned(&pilot.quicker(QUICKEST.powf(middle)))?;
+        if allows(&tried) {
+            (best, high) = (tried, middle);
+        } else {
+            low = middle;
+        }
+    }
+    Ok(best)
+}
+
+/// No look is coarser than another by more than this.
+const QUICKEST: f64 = 20.0;
+
+/// Halvings of the way to it.
+const HALVINGS: usize = 6;
