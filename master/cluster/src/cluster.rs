@@ -286,7 +286,7 @@ impl Cluster {
     pub(crate) fn refuse(&self, worker: &Arc<str>) {
         tracing::error!(%worker, "returned wrong rows and is refused from now on; all rows of this solve are computed anew");
         let mut state = self.lock();
-        state.scheduler.dismiss(worker);
+        state.scheduler.dismiss(self.now(), worker);
         if !state.refused.contains(worker) {
             if state.refused.len() >= MOST_REFUSED {
                 state.refused.remove(0);
@@ -309,6 +309,7 @@ impl Cluster {
 
 /// Workers that are remembered as refused: the last ones.
 const MOST_REFUSED: usize = 4096;
+
 /// Remarks that are kept.
 const MOST_REMARKS: usize = 100;
 

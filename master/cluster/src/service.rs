@@ -71,8 +71,8 @@ impl WorkerService for Service {
         let cluster = &self.0;
         let limits = &cluster.0.limits;
         let mut state = cluster.lock();
-        if state.refused.contains(&facts.identity) {
-            let text = format!("worker {} returned wrong rows", facts.identity);
+        if state.refused.contains(&facts.who) {
+            let text = format!("worker {} returned wrong rows", facts.who);
             return Err(Status::failed_precondition(text));
         }
         if state.scheduler.facts().count() >= limits.workers {
@@ -353,14 +353,15 @@ impl Cluster {
         let of = state
             .scheduler
             .wanted(self.now(), header.worker_id, header.lease_id);
-        let identity = state.scheduler.identity(header.worker_id);
-        if let (Ok(Some(of)), Some(identity)) = (of, identity) {
+        let facts = state.scheduler.facts_of(header.worker_id);
+        let who = facts.map(|facts| facts.who.clone());
+        if let (Ok(Some(of)), Some(who)) = (of, who) {
             let results = state.solves.get(&of.solve).map(|open| open.results.clone());
             drop(state);
-            self.refuse(&identity);
+            self.refuse(&who);
             if let Some(results) = results {
                 // nobody listens where the solve has failed
-                let _ = results.send(Err(identity));
+                let _ = results.send(Err(who));
             }
         }
         let text = "result without what its lines see";

@@ -14,7 +14,6 @@ mod tests;
 mod worker;
 
 use std::collections::BTreeMap;
-use std::sync::Arc;
 
 use leases::{Lease, release};
 use solve::Solve;
@@ -215,11 +214,11 @@ impl Scheduler {
     }
 
     /// All workers that are called so go.
-    pub fn dismiss(&mut self, who: &str) {
+    pub fn dismiss(&mut self, now: Time, who: &str) {
         let of = |(&id, worker): (&Id, &Worker)| (*worker.facts.who == *who).then_some(id);
         let theirs: Vec<Id> = self.workers.iter().filter_map(of).collect();
         for worker in theirs {
-            self.leave(worker);
+            self.leave(now, worker);
         }
     }
 

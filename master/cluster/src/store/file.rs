@@ -212,7 +212,7 @@ impl File {
     /// Who computed the result of that name, where it was a worker.
     pub(super) fn origin(&self, key: &Key) -> Result<Option<Origin>, String> {
         let read = guarded(|| {
-            let begun = self.database.begin_read()?;
+            let begun = self.database.get()?.begin_read()?;
             let found = begun.open_table(ORIGINS)?.get(&key[..])?;
             Ok(found.map(|found| {
                 let (worker, audited) = found.value();
@@ -246,7 +246,7 @@ impl File {
 
     fn note_audited(&mut self, key: &Key) -> Result<(), FileError> {
         guarded(|| {
-            let begun = self.database.begin_write()?;
+            let begun = self.database.get()?.begin_write()?;
             {
                 let mut origins = begun.open_table(ORIGINS)?;
                 let worker = origins.get(&key[..])?.map(|of| of.value().0.to_owned());
@@ -262,7 +262,7 @@ impl File {
     fn drop_of(&mut self, worker: &str) -> Result<(), FileError> {
         let mut bytes = self.bytes;
         self.bytes = guarded(|| {
-            let begun = self.database.begin_write()?;
+            let begun = self.database.get()?.begin_write()?;
             {
                 let mut by_name = begun.open_table(RESULTS)?;
                 let mut order = begun.open_table(ORDER)?;
@@ -280,7 +280,7 @@ impl File {
                 }
                 order.retain(|_, (name, size)| {
                     let goes = theirs.contains(name);
-                    bytes -= if goes { size } else { 0 };
+                    bytes = bytes.saturating_sub(if goes { size } else { 0 });
                     !goes
                 })?;
             }
