@@ -110,7 +110,7 @@ fn names_of_files_and_bands_do_not_steer_the_terminal() {
             "--out",
             "out",
         ],
-        &["solve", "scene.toml", "--out", "out", "--\u{7}x"],
+        &["solve", "scene.toml", "--out", "out", "--\u{202e}x"],
         &["status", "--master", "http://\u{1b}[2J:1"],
     ] {
         let output = desk.run(args);
