@@ -139,3 +139,39 @@ nestrad is no command here.
     );
     assert!(Path::new(README).exists());
 }
+
+/// All that the Rust files of a folder say.
+fn rust_of(folder: &Path, text: &mut String) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() && !path.ends_with("target") {
+            rust_of(&path, text);
+        } else if path.extension().is_some_and(|kind| kind == "rs") {
+            text.push_str(&fs::read_to_string(&path).unwrap());
+        }
+    }
+}
+
+/// The page for operators says what nobody can do to whom, and which test shows it.
+#[test]
+fn each_test_that_the_page_for_operators_names_is_there() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let page = fs::read_to_string(root.join("master/docs/operators.md")).unwrap();
+    let mut code = String::new();
+    for folder in ["common", "master", "proto", "tests", "worker"] {
+        rust_of(&root.join(folder), &mut code);
+    }
+    let is_word = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_';
+    let is_test = |name: &&str| {
+        // metrics are not sentences
+        name.matches('_').count() >= 3
+            && name.chars().all(is_word)
+            && !name.starts_with('_')
+            && !name.starts_with("nestrad_")
+    };
+    let named: Vec<&str> = page.split('`').filter(is_test).collect();
+    assert!(named.len() > 25, "{named:?}");
+    for name in named {
+        assert!(code.contains(&format!("fn {name}(")), "{name}");
+    }
+}
