@@ -13,7 +13,7 @@ pub fn spread_effort(
     sources: &Sources,
     extent: &Extent,
     finest_m2: f64,
-    ground_area_m2: f64,
+    (ground_area_m2, leaf_area_m2): (f64, f64),
 ) -> Vec<f64> {
     let intensity: Vec<f64> = sources
         .list
@@ -30,7 +30,11 @@ pub fn spread_effort(
             let area = (finest_m2 * coarser).min(fewest).max(f64::MIN_POSITIVE);
             // low light drags the box of an open scene far out
             let most = MOST_TIMES * (ground_area_m2 / finest_m2).max(FEWEST_POINTS);
-            area * (extent.lines_through(-source.direction, area) / most).max(1.0)
+            let lines = extent.lines_through(-source.direction, area);
+            let area = area * (lines / most).max(1.0);
+            // what reaches into many copies of the pattern is drawn in each of them
+            let drawn = leaf_area_m2 / area;
+            area * (drawn / MOST_DRAWN.max(MOST_DEEP * lines.min(most))).max(1.0)
         })
         .collect();
     let points = |(source, &area): (&Source, &f64)| extent.lines_through(-source.direction, area);
@@ -78,6 +82,11 @@ const COARSEST_OF_MANY: f64 = 16.0;
 /// No source is drawn with more points than this many times those that the strongest has on the ground.
 const MOST_TIMES: f64 = 8.0;
 
+/// Nor are more points of surfaces drawn than this, of all that stands behind one another, or than this many for each
+/// line where those are more.
+const MOST_DRAWN: f64 = 1e8;
+const MOST_DEEP: f64 = 200.0;
+
 /// No source is drawn with lines coarser than this many times those of the strongest.
 const COARSEST: f64 = 16.0;
 
@@ -89,6 +98,8 @@ const MOST_POINTS: f64 = 3e10;
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
 
     /// It was drawn 16 times coarser, like the directions of its sky: direct light erred by 8.6 % in place of 0.5 %.
@@ -116,6 +127,30 @@ mod tests {
         assert_eq!(coarser(&[5.0, 5.0, 0.001], 0), [1.0, 1.0, 16.0]);
         // without any light, whatever
         assert_eq!(coarser(&[0.0, 1.0], 1).len(), 2);
+    }
+
+    /// Of random scene 8100367: a triangle that hangs over thousands of copies of the pattern was drawn in each of them
+    /// at a million points, which took minutes.
+    #[test]
+    fn fault_a_triangle_over_thousands_of_patterns_took_minutes() {
+        let extent = Extent {
+            min_m: DVec3::ZERO,
+            max_m: DVec3::ONE,
+            periodic: true,
+        };
+        let sources = Sources {
+            list: vec![Source {
+                direction: DVec3::new(0.6, 0.0, -0.8),
+                irradiance_W_m2: vec![1.0],
+            }],
+            sky_directions: 0,
+        };
+        for (leaf_area_m2, finest_m2) in [(1e4, 1e-6), (1e4, 1e-8), (5.0, 1e-6)] {
+            let area = spread_effort(&sources, &extent, finest_m2, (1.0, leaf_area_m2))[0];
+            assert!(leaf_area_m2 / area <= 1.0001 * (MOST_DEEP * 0.8 / finest_m2).max(MOST_DRAWN));
+            let is_deep = leaf_area_m2 > 1e3;
+            assert_eq!(area > finest_m2, is_deep, "{leaf_area_m2} {area}");
+        }
     }
 
     #[test]

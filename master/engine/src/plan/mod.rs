@@ -150,13 +150,17 @@ pub struct LightPlan {
     /// See [`Scale::ground_area_m2`].
     #[serde(skip)]
     pub ground_area_m2: f64,
+    /// See [`Scale::area_m2`].
+    #[serde(skip)]
+    pub leaf_area_m2: f64,
 }
 
 impl LightPlan {
     /// Cross-sections of the lines of each source, m², through a scene of that extent.
     pub fn line_areas_m2(&self, extent: &Extent, sources: &Sources) -> Vec<f64> {
         let finest_m2 = self.direct_line_area_m2;
-        direct::spread_effort(sources, extent, finest_m2, self.ground_area_m2)
+        let areas_m2 = (self.ground_area_m2, self.leaf_area_m2);
+        direct::spread_effort(sources, extent, finest_m2, areas_m2)
     }
 }
 
@@ -366,6 +370,7 @@ impl Plan {
                     most_passes: 500,
                 },
                 ground_area_m2: scale.ground_area_m2,
+                leaf_area_m2: scale.area_m2,
             },
             memory: Memory::default(),
             reasons: Vec::new(),
