@@ -219,7 +219,8 @@ fn pump(path: PathBuf, mut wanted: impl FnMut(Vec<u8>) -> bool) -> io::Result<()
     }
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
+#[cfg(unix)]
 mod tests {
     use std::io::Write;
     use std::process::Command;

@@ -144,8 +144,10 @@ impl Coming<'_> {
             self.pressed = None;
         }
         let pressed = now - since;
-        let needed = self.promised as f64 * pressed.as_secs_f64() / WITHIN.as_secs_f64();
-        let holds_up = is_wanted && pressed > MOMENT && ((self.came - before) as f64) < needed;
+        // parts that come in a moment are not there yet
+        let counted = pressed.saturating_sub(MOMENT);
+        let needed = self.promised as f64 * counted.as_secs_f64() / WITHIN.as_secs_f64();
+        let holds_up = is_wanted && ((self.came - before) as f64) < needed;
         if crawls || holds_up {
             let (came, promised) = (self.came, self.promised);
             let taken_s = (now - self.begun).as_secs_f64();

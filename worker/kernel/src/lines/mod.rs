@@ -48,7 +48,7 @@ fn seen_along(block: &Block, group: &[Lines]) -> (u64, Vec<Vec<Pair>>) {
 pub(crate) fn of_one_row(block: &Block, batch: &Batch, number: u64) -> Vec<Pair> {
     let mut pairs = Vec::new();
     let (lattices, parts) = lattices(block, &batch.lines);
-    let pick = |bits: u64, of: u64| bits as u32 as u64 * of >> 32;
+    let pick = |bits: u64, of: u64| (bits as u32 as u64 * of) >> 32;
     let k = pick(number, lattices.len() as u64) as usize;
     if let Some((lattice, &part)) = lattices.get(k).zip(parts.get(k)) {
         let rows = rows_of(lattice, part);
