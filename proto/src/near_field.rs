@@ -179,6 +179,7 @@ pub fn batch_message(batch: &Batch) -> v1::Batch {
             least_samples: rays.least_samples,
             batches_in_half: rays.batches_in_half,
             lines_per_m2: rays.lines_per_m2,
+            in_a_row_m: rays.in_a_row_m,
             parts: rays.part.count(),
             part: rays.part.number(),
         }),
@@ -204,6 +205,7 @@ pub fn batch(message: &v1::Batch) -> Batch {
             least_samples: rays.least_samples,
             batches_in_half: rays.batches_in_half,
             lines_per_m2: rays.lines_per_m2,
+            in_a_row_m: rays.in_a_row_m,
             part: Part::new(rays.part, rays.parts),
         }),
     }
@@ -307,6 +309,7 @@ mod tests {
                 least_samples: 4.0,
                 batches_in_half: 8,
                 lines_per_m2: 1e5,
+                in_a_row_m: 0.04,
                 part: Part::default(),
             }),
         };

@@ -231,10 +231,11 @@ impl<F: Fn(&Run) -> ExchangeError + Sync> RowSource for OneRound<F> {
     }
 }
 
-/// Solves in rounds, of which only the first succeeds; gives the plans, too.
+/// Solves in rounds, of which only the first succeeds: in the second, `then` is done with the stop of the whole. Gives
+/// the plans, too.
 fn in_one_round(
     scene: &Scene,
-    then: impl Fn(&Run) -> ExchangeError + Sync,
+    then: impl Fn(&Stop) -> ExchangeError + Sync,
 ) -> (Result<rounds::Solved, RoundsError>, Vec<Plan>) {
     // where there is time enough but not endless, a coarse look comes first
     let settings = Settings {
@@ -243,14 +244,17 @@ fn in_one_round(
         budget_s: Some(1e6),
         ..Settings::default()
     };
-    let cuts = AtomicUsize::new(0);
+    let (cuts, stop) = (AtomicUsize::new(0), Stop::default());
+    let then = |_: &Run| then(&stop);
     let rows = OneRound { cuts, then };
     let mut plans = Vec::new();
     let watch = &mut Stopwatch::start();
-    let solved = unwatched(|run| {
-        let begins = |plan: &Plan, _: &[_]| plans.push(plan.clone());
-        solve_in_rounds(scene, &settings, &rows, run, watch, begins)
-    });
+    let run = &Run {
+        stop: &stop,
+        progress: &Progress::default(),
+    };
+    let begins = |plan: &Plan, _: &[_]| plans.push(plan.clone());
+    let solved = solve_in_rounds(scene, &settings, &rows, run, watch, begins);
     (solved, plans)
 }
 
@@ -276,7 +280,11 @@ fn a_later_round_that_fails_leaves_the_one_before_and_says_why() {
 
 #[test]
 fn a_later_round_that_is_stopped_leaves_nothing() {
-    let (solved, plans) = in_one_round(&overcast_maize(), |_| Stopped.into());
+    let stopped = |stop: &Stop| {
+        stop.stop();
+        Stopped.into()
+    };
+    let (solved, plans) = in_one_round(&overcast_maize(), stopped);
     assert_eq!(plans.len(), 2);
     let error = solved.unwrap_err();
     let stopped = matches!(error, RoundsError::Solve(SolveError::Stopped(_)));

@@ -102,7 +102,7 @@ impl Resident {
         // there is not to be room for two
         self.held = None;
         let directions = if self.keeps_directions {
-            let of_canopy = GIB * (plan.memory.scene_GiB + plan.memory.rows_GiB);
+            let of_canopy = GIB * plan.memory.total_GiB();
             KeptDirections::within(self.most_bytes.saturating_sub(of_canopy as u64))
         } else {
             KeptDirections::default()

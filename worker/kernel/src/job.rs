@@ -28,6 +28,9 @@ pub struct Rays {
     pub batches_in_half: u32,
     /// Lines of a half that meet a square metre of leaf, on average over its inclination.
     pub lines_per_m2: f64,
+    /// What is longer than this is met by several lines of the batch at a time, metres: see [`in_a_row_m`]. A job may
+    /// have rays of a batch and none of its lines.
+    pub in_a_row_m: f64,
     /// From which part of the faces of the block rays are cast.
     pub part: Part,
 }
@@ -46,21 +49,19 @@ pub struct Batch {
 /// Up to so many lines in a row are as good as lines here and there.
 const IN_A_ROW: f64 = 4.0;
 
-impl Batch {
-    /// What is longer than this is met by several of the batch's lines at a time, metres.
-    pub fn lines_in_a_row_m(&self) -> f64 {
-        match self.lines.first() {
-            Some(lines) => IN_A_ROW * lines.line_area_m2.sqrt(),
-            None => f64::INFINITY,
-        }
+/// What is longer than this is met by several lines of a batch at a time, metres; infinite without lines.
+pub fn in_a_row_m(lines: &[Lines]) -> f64 {
+    match lines.first() {
+        Some(lines) => IN_A_ROW * lines.line_area_m2.sqrt(),
+        None => f64::INFINITY,
     }
 }
 
 impl Rays {
     /// Rays in all batches of a half for a face of that area and that longest edge. What is long is met by many lines
     /// of a lattice at a time, if by any: these are one sample.
-    pub fn of_half(&self, area_m2: f64, longest_m: f64, in_a_row_m: f64) -> u32 {
-        let at_a_time = (longest_m / in_a_row_m).max(1.0);
+    pub fn of_half(&self, area_m2: f64, longest_m: f64) -> u32 {
+        let at_a_time = (longest_m / self.in_a_row_m).max(1.0);
         (self.least_samples - area_m2 * self.lines_per_m2 / at_a_time)
             .ceil()
             .max(0.0) as u32

@@ -95,6 +95,7 @@ fn sample(periodic: bool) -> Option<PackedRows> {
             least_samples: 8.0,
             batches_in_half: 1,
             lines_per_m2: 0.0,
+            in_a_row_m: f64::INFINITY,
             part: Part::default(),
         }),
     };

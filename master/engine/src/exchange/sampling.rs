@@ -1,7 +1,7 @@
 //! How densely the exchange is sampled, and the batches of directions that follow from it.
 
 use nestrad_kernel::directions::{Axes, Purpose, axes, stream};
-use nestrad_kernel::job::{Batch, Lines, Rays};
+use nestrad_kernel::job::{Batch, Lines, Rays, in_a_row_m};
 use nestrad_kernel::lattice::{Extent, Lattice};
 use nestrad_kernel::part::Part;
 use rand::RngExt;
@@ -88,16 +88,18 @@ impl Sampling {
     pub fn batch(&self, index: u32) -> Batch {
         let numbers = (self.seed, Purpose::Lines, u64::from(index));
         let sets = (self.axes, self.sets_per_batch);
+        let lines = lines_along(numbers, sets, self.line_area_m2);
         Batch {
             index,
-            lines: lines_along(numbers, sets, self.line_area_m2),
             rays: Some(Rays {
                 seed: self.seed,
                 least_samples: self.least_samples,
                 batches_in_half: self.batches / 2,
                 lines_per_m2: self.lines_per_m2(),
+                in_a_row_m: in_a_row_m(&lines),
                 part: Part::default(),
             }),
+            lines,
         }
     }
 }

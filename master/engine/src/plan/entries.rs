@@ -61,18 +61,17 @@ impl Plan {
     fn rays(&self, lit: &LitCanopy, sampling: &Sampling) -> f64 {
         let batch = sampling.batch(0);
         let Some(rays) = batch.rays else { return 0.0 };
-        let in_a_row_m = batch.lines_in_a_row_m();
         let of_triangle = |corners: [DVec3; 3]| {
             let n = f64::from(divisions(&corners, self.trace.max_edge_m));
             let (area_m2, longest_m) = (geometry::area(&corners), geometry::longest_edge(&corners));
-            let of_face = rays.of_half(area_m2 / (n * n), longest_m / n, in_a_row_m);
+            let of_face = rays.of_half(area_m2 / (n * n), longest_m / n);
             2.0 * n * n * f64::from(of_face)
         };
         let of_faces: f64 = lit.canopy.corners_m().map(of_triangle).sum();
         let of_soil = lit.canopy.soil_z_m.map_or(0.0, |z_m| {
             let cells = SoilGrid::over(&extent_of(lit.canopy), z_m, self.trace.soil_cell_m);
             let longest_m = cells.cell_m.max_element();
-            let of_cell = rays.of_half(cells.cell_area_m2(), longest_m, in_a_row_m);
+            let of_cell = rays.of_half(cells.cell_area_m2(), longest_m);
             f64::from(cells.len()) * f64::from(of_cell)
         });
         2.0 * (of_faces + of_soil)

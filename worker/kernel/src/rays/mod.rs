@@ -58,8 +58,6 @@ pub(crate) fn complete(block: &Block, tracer: &Tracer, batch: &Batch, seen: &mut
 struct Share<'a> {
     rays: &'a Rays,
     batch: u32,
-    /// What is longer than this is met by several lines at a time.
-    in_a_row_m: f64,
 }
 
 impl<'a> Share<'a> {
@@ -67,7 +65,6 @@ impl<'a> Share<'a> {
         Self {
             rays,
             batch: batch.index,
-            in_a_row_m: batch.lines_in_a_row_m(),
         }
     }
 
@@ -79,7 +76,7 @@ impl<'a> Share<'a> {
     /// Rays in this batch for a face of that area and that longest edge: those of the half are dealt out in
     /// turn.
     fn rays_of(&self, area_m2: f64, longest_m: f64, face: u32) -> u32 {
-        let missing = self.rays.of_half(area_m2, longest_m, self.in_a_row_m);
+        let missing = self.rays.of_half(area_m2, longest_m);
         let batches = self.rays.batches_in_half.max(1);
         let turn = (self.batch % batches + face % batches) % batches;
         missing / batches + u32::from(turn < missing % batches)
