@@ -3,6 +3,7 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use parquet::errors::ParquetError;
 use thiserror::Error;
 
 /// A result that could not be written. Files that were there before are as they were.
@@ -38,6 +39,21 @@ impl OutputError {
     }
 }
 
+impl Fault {
+    /// What the system said, where it was the system that refused, whoever wrote the file.
+    pub fn io_kind(&self) -> Option<io::ErrorKind> {
+        match self {
+            Self::Io(error) => Some(error.kind()),
+            Self::Json(error) => error.io_error_kind(),
+            Self::Parquet(ParquetError::External(error)) => {
+                let error = error.downcast_ref::<io::Error>();
+                error.map(io::Error::kind)
+            }
+            _ => None,
+        }
+    }
+}
+
 /// Why a file could not be written.
 #[derive(Debug, Error)]
 pub enum Fault {
@@ -57,7 +73,7 @@ pub enum Fault {
     IsFolder,
     /// The Parquet encoder refused.
     #[error(transparent)]
-    Parquet(#[from] parquet::errors::ParquetError),
+    Parquet(#[from] ParquetError),
     /// The JSON encoder refused.
     #[error(transparent)]
     Json(#[from] serde_json::Error),

@@ -126,7 +126,7 @@ fn of_one(error: &(dyn Error + 'static)) -> Option<Exit> {
         return Some(of_refusal(RefusalKind::of(status.code())));
     }
     if let Some(error) = error.downcast_ref::<io::Error>() {
-        return of_io(error);
+        return of_io(error.kind());
     }
     // transparent wrappers hide what they are made of from the chain
     match error.downcast_ref::<TradeError>() {
@@ -134,8 +134,10 @@ fn of_one(error: &(dyn Error + 'static)) -> Option<Exit> {
         Some(TradeError::Stopped(_)) => return Some(Exit::Cancelled),
         _ => {}
     }
-    if let Some(OutputError::Mismatch { .. }) = error.downcast_ref() {
-        return Some(Exit::Fault);
+    match error.downcast_ref() {
+        Some(OutputError::File { fault, .. }) => return fault.io_kind().and_then(of_io),
+        Some(OutputError::Mismatch { .. }) => return Some(Exit::Fault),
+        None => {}
     }
     if let Some(ServeError::Fault(_)) = error.downcast_ref() {
         return Some(Exit::Fault);
@@ -183,10 +185,10 @@ fn of_refusal(kind: RefusalKind) -> Exit {
 }
 
 /// What the system does not allow for lack of room; all else is said of a file, which is input.
-fn of_io(error: &io::Error) -> Option<Exit> {
+fn of_io(kind: io::ErrorKind) -> Option<Exit> {
     use io::ErrorKind::{FileTooLarge, OutOfMemory, QuotaExceeded, StorageFull};
     let is_full = matches!(
-        error.kind(),
+        kind,
         StorageFull | QuotaExceeded | FileTooLarge | OutOfMemory
     );
     is_full.then_some(Exit::Limit)

@@ -1,10 +1,11 @@
 //! What a solve writes.
 
 use std::path::Path;
+use std::process::Command;
 
 use serde_json::Value;
 
-use super::desk::{Desk, SOLVE, SOLVE_BY_FLAGS, files};
+use super::desk::{Desk, Ran, SOLVE, SOLVE_BY_FLAGS, files};
 
 const TABLES: [&str; 3] = ["organs.csv", "triangles.csv", "soil.csv"];
 
@@ -220,5 +221,24 @@ fn the_independent_estimator_agrees() {
     let (lines, rays) = (absorbed("lines"), absorbed("rays"));
     for (line, ray) in lines.iter().zip(&rays) {
         assert!((line / ray - 1.0).abs() < 0.01, "{lines:?} {rays:?}");
+    }
+}
+
+#[test]
+fn a_disk_that_is_full_under_the_results_is_a_limit() {
+    let desk = Desk::new();
+    for format in ["csv", "parquet"] {
+        let mut command = Command::new("bash");
+        // no file can be written, as on a full disk; pipes can
+        let full = "trap '' XFSZ; ulimit -f 0; exec \"$0\" \"$@\"";
+        let nestrad = desk.command(&[]);
+        command
+            .args(["-c", full])
+            .arg(nestrad.get_program())
+            .args(with(&["--format", format]))
+            .current_dir(desk.path(""));
+        let ran = Ran::from(command.output().unwrap());
+        assert_eq!(ran.code, Some(4), "{format}: {}", ran.stderr);
+        assert!(ran.stderr.contains("cannot write out/"), "{}", ran.stderr);
     }
 }
