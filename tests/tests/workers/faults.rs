@@ -1,6 +1,10 @@
+use std::process::Command;
+use std::thread::sleep;
+use std::time::Duration;
+
 use nestrad_tests::crew::{Process, Solving, worker};
 use nestrad_tests::desk::Desk;
-use nestrad_tests::processes::{Master, nestrad, signal, until};
+use nestrad_tests::processes::{Master, nestrad, until};
 
 use super::{SCENE, maize};
 
@@ -70,8 +74,15 @@ fn a_later_round_whose_workers_are_all_killed_is_finished_by_the_master() {
     let args = [&args[..], &FINE].concat();
     let mut solving = Process::start(nestrad(desk.folder(), &args));
     solving.says("round 1 reached");
-    for worker in solving.children() {
-        signal(worker, "KILL");
+    // a round begins with workers of its own
+    for _ in 0..50 {
+        for worker in solving.children() {
+            // it may have ended by itself
+            let _ = Command::new("kill")
+                .args(["-KILL", &worker.to_string()])
+                .output();
+        }
+        sleep(Duration::from_millis(20));
     }
     assert_eq!(solving.ends().code(), Some(0), "{}", solving.log());
     let log = solving.log();
