@@ -340,7 +340,3 @@ async fn watch(cluster: Weak<Shared>) {
         cluster.0.changed.notify_waiters();
     }
 }
-
-pub(crate) fn kibibytes(bytes: u64) -> u32 {
-    u32::try_from(bytes.div_ceil(1 << 10)).unwrap_or(u32::MAX)
-}

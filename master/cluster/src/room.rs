@@ -12,8 +12,6 @@ use tokio::sync::{Semaphore, SemaphorePermit};
 use tokio::time::{Instant, timeout};
 use tonic::Status;
 
-use crate::cluster::kibibytes;
-
 /// A result that takes more than this part of the room is a large one.
 const PART_OF_LARGE: u64 = 16;
 
@@ -157,6 +155,10 @@ impl Coming<'_> {
         }
         Ok(())
     }
+}
+
+fn kibibytes(bytes: u64) -> u32 {
+    u32::try_from(bytes.div_ceil(1 << 10)).unwrap_or(u32::MAX)
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::sync::{Arc, Mutex};
 
 use super::caller::Caller;
-use super::solve::lock;
+use super::lock::lock;
 
 /// Bytes that may be taken, and that are.
 #[derive(Clone, Debug)]

@@ -13,6 +13,7 @@ mod held;
 mod identity;
 mod intake;
 mod limits;
+mod lock;
 mod metrics;
 mod metrics_port;
 mod rpc;

@@ -13,7 +13,7 @@ use super::error::{ErrorCode, ServiceError};
 use super::held::{HeldCanopy, Lighting};
 use super::identity::{Id, scene_id};
 use super::intake::Surface;
-use super::solve::lock;
+use super::lock::lock;
 
 /// Scenes that are held at a time, however small.
 const MAX_SCENES: usize = 1024;

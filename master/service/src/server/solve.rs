@@ -1,6 +1,6 @@
 //! A solve from its start until it is forgotten: where it is, and whether its client has what came of it.
 
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex};
 use std::time::{Duration, Instant};
 
 use nestrad_proto::v1;
@@ -8,6 +8,7 @@ use tokio::sync::watch;
 
 use super::caller::Caller;
 use super::identity::Id;
+use super::lock::lock;
 use super::scenes::HeldScene;
 use super::solution::HeldSolution;
 use nestrad_engine::plan::Settings;
@@ -271,9 +272,4 @@ impl Solve {
             running_s: running.unwrap_or_default().as_secs_f64(),
         }
     }
-}
-
-pub(super) fn lock<T>(mutex: &Mutex<T>) -> MutexGuard<'_, T> {
-    // what is behind these locks is whole at any time, even if a thread died with one
-    mutex.lock().unwrap_or_else(PoisonError::into_inner)
 }

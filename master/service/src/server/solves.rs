@@ -11,8 +11,9 @@ use super::admission::{self, Bounds};
 use super::caller::Caller;
 use super::error::{ErrorCode, ServiceError};
 use super::identity::{Id, solve_id};
+use super::lock::lock;
 use super::scenes::HeldScene;
-use super::solve::{Phase, Solve, lock};
+use super::solve::{Phase, Solve};
 use nestrad_engine::plan::Settings;
 
 pub(super) use solver::Solver;
