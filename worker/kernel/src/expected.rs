@@ -20,18 +20,10 @@ use crate::block::Block;
 use crate::job::Batch;
 use crate::lattice::Lattice;
 use crate::lines::{LinesOnSoil, lattices, of_one_row, rows_of};
+use crate::owned::Owned;
 use crate::packed::{self, PackedFault, Pair, Shape};
 use crate::rays;
 use crate::rows::Counts;
-
-/// What a block holds of the scene.
-#[derive(Clone, Copy, Debug)]
-pub struct Owned<'a> {
-    /// Numbers of its triangles in the scene, and whether rows of them are wanted; rising.
-    pub triangles: &'a [(u32, bool)],
-    /// Numbers of the soil cells whose rows are wanted; rising.
-    pub soil_cells: &'a [u32],
-}
 
 /// What is known of all jobs of a block.
 #[derive(Clone, Debug)]

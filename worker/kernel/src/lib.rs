@@ -28,6 +28,7 @@ mod kernel;
 pub mod lattice;
 mod lines;
 mod memory;
+pub mod owned;
 pub mod packed;
 pub mod part;
 mod rays;

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use nestrad_kernel::block::{BlockFrame, CellRun, TriangleRun};
-use nestrad_kernel::expected::Owned;
+use nestrad_kernel::owned::Owned;
 use nestrad_kernel::{Block, BlockFault};
 
 use crate::frame::{Frame, joined};
