@@ -21,6 +21,7 @@ mod receive;
 mod room;
 mod rows;
 pub mod scheduler;
+mod seen;
 mod sending;
 mod service;
 mod solving;

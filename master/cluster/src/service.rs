@@ -1,8 +1,6 @@
 //! What workers call.
 
 use std::hash::BuildHasher;
-use std::net::IpAddr;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
@@ -22,7 +20,8 @@ use tonic::{Request, Response, Status, Streaming};
 
 use crate::cluster::{Brought, Cluster, ClusterState};
 use crate::receive::{self, Wanted};
-use crate::scheduler::{BlockId, Id, Identity, Leased, Refusal, WorkerFacts};
+use crate::scheduler::{BlockId, Id, Leased, Refusal, WorkerFacts};
+use crate::seen::Seen;
 use crate::sending::Sending;
 
 /// Longest wait for a job.
@@ -416,48 +415,6 @@ impl Cluster {
             }));
         }
         leased.is_some()
-    }
-}
-
-/// What a master sees of a worker by itself.
-struct Seen {
-    address: Option<IpAddr>,
-    certificate: Option<Vec<u8>>,
-}
-
-impl Seen {
-    fn of<T>(request: &Request<T>) -> Self {
-        let certificates = request.peer_certs();
-        let own = certificates.as_deref().and_then(|chain| chain.first());
-        Self {
-            address: request.remote_addr().map(|address| address.ip()),
-            certificate: own.map(|own| own.to_vec()),
-        }
-    }
-
-    /// By what a worker is known when it comes again: its certificate where it has one, else its address; and its name.
-    fn identity(&self, name: &str) -> Identity {
-        let address = self.address.map(|address| address.to_string());
-        let peer = match (&self.certificate, &address) {
-            (Some(certificate), _) => &certificate[..],
-            (None, Some(address)) => address.as_bytes(),
-            (None, None) => &[],
-        };
-        let mut identity = blake3::Hasher::new();
-        identity.update(&(peer.len() as u64).to_le_bytes());
-        identity.update(peer).update(name.as_bytes());
-        *identity.finalize().as_bytes()
-    }
-
-    /// Who that is, for people to read: nobody else has its certificate; without one, its address and its name have to
-    /// do.
-    fn who(&self, name: &str) -> Arc<str> {
-        let address = self.address.map(|address| address.to_string());
-        match &self.certificate {
-            Some(own) => format!("with certificate {}", &blake3::hash(own).to_hex()[..16]),
-            None => format!("{name} at {}", address.as_deref().unwrap_or("?")),
-        }
-        .into()
     }
 }
 
