@@ -60,7 +60,10 @@ fn a_thousand_solves_through_one_master_leave_nothing_behind() {
     assert!(master.metric("nestrad_scene_bytes") <= bound);
     assert!(master.metric("nestrad_result_bytes") <= bound);
     assert!(more < 4e6, "{more} bytes more");
-    assert!(master.metric("nestrad_open_files") <= files);
+    // a loaded machine may close what the last metric was read through a little later
+    until("files are closed", || {
+        master.metric("nestrad_open_files") <= files
+    });
     // shown with --nocapture
     eprintln!(
         "1000 solves in {:.1} s; {memory_bytes} bytes resident after 300, {more} more after 1000",
