@@ -32,6 +32,12 @@ struct Held {
     traced: TracedCanopy,
 }
 
+impl Held {
+    fn bytes(&self) -> u64 {
+        self.canopy.bytes() + self.traced.bytes()
+    }
+}
+
 impl Resident {
     /// Holds a canopy that takes so many bytes at most, directions of light included.
     pub fn within(most_bytes: u64) -> Self {
@@ -56,9 +62,9 @@ impl Resident {
         self.held = None;
     }
 
-    /// Bytes that are held.
+    /// Bytes that are held, with the canopy as it was read.
     pub fn bytes(&self) -> u64 {
-        self.held.as_ref().map_or(0, |held| held.traced.bytes())
+        self.held.as_ref().map_or(0, Held::bytes)
     }
 
     /// How the canopy was traced and for what, if it is resident and was traced as these settings have it.
@@ -86,7 +92,17 @@ impl Resident {
         run: &Run,
         watch: &mut Stopwatch,
     ) -> Result<(Solution, WorkDone), SolveError> {
-        let fits = |held: &Held| is_same(&held.canopy, canopy) && held.plan == plan.trace;
+        let fits = |held: &Held| {
+            // when direct light is computed changes nothing of what was traced
+            let in_turn = held.plan.in_turn;
+            let trace = &plan.trace;
+            is_same(&held.canopy, canopy)
+                && held.plan
+                    == TracePlan {
+                        in_turn,
+                        ..trace.clone()
+                    }
+        };
         if let Some(held) = self.held.as_ref().filter(|held| fits(held)) {
             let (optics, sources) = (lit.optics, lit.sources);
             let lit = held
@@ -108,15 +124,14 @@ impl Resident {
             KeptDirections::default()
         };
         let (solution, work, traced) = solve_and_keep(lit, plan, (rows, run, watch), directions)?;
-        if traced.bytes() <= self.most_bytes {
-            self.held = Some(Held {
-                canopy: canopy.clone(),
-                settings: *settings,
-                plan: plan.trace.clone(),
-                aims: plan.aims,
-                traced,
-            });
-        }
+        let held = Held {
+            canopy: canopy.clone(),
+            settings: *settings,
+            plan: plan.trace.clone(),
+            aims: plan.aims,
+            traced,
+        };
+        self.held = (held.bytes() <= self.most_bytes).then_some(held);
         Ok((solution, work))
     }
 }

@@ -22,6 +22,13 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
         .map_err(|_| "expected a number, such as 0.5".to_owned())
 }
 
+/// A finite number, 0 or more.
+pub(super) fn not_negative(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok();
+    let number = number.filter(|value: &f64| value.is_finite() && *value >= 0.0);
+    number.ok_or_else(|| "expected a number, 0 or more".to_owned())
+}
+
 /// A finite number above 0.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
     let number = text.parse().ok();

@@ -14,7 +14,7 @@ use nestrad_service::server::{Service, ServiceLimits};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
 
-use super::numbers::{positive, whole};
+use super::numbers::{not_negative, positive, whole};
 use super::state::StateFlags;
 use super::workers::{fraction, lease};
 
@@ -80,6 +80,11 @@ struct LimitFlags {
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     scene_memory: f64,
 
+    /// Memory for canopies that stay traced after a solve, GiB; the longest unused makes room for others. Another
+    /// light or other optics trace nothing then. 0 is none
+    #[arg(long, value_name = "GIB", default_value_t = 2.0, value_parser = not_negative, allow_negative_numbers = true)]
+    resident_memory: f64,
+
     /// Memory for results that are held, GiB; where it is full, new solves are refused until results were fetched
     #[arg(long, value_name = "GIB", default_value_t = 4.0, value_parser = positive)]
     result_memory: f64,
@@ -95,6 +100,7 @@ impl LimitFlags {
         ServiceLimits {
             scene_bytes: bytes(self.scene_memory),
             result_bytes: bytes(self.result_memory),
+            resident_bytes: bytes(self.resident_memory),
             solve_GiB: self.memory,
             solves: self.solves.into(),
             queue: self.queue as usize,

@@ -70,9 +70,11 @@ fn text(status: &v1::StatusResponse) -> String {
     line(
         "memory",
         format!(
-            "{} scenes, {:.1} MiB; results, {:.1} MiB",
+            "{} scenes, {:.1} MiB; {} traced canopies, {:.1} MiB; results, {:.1} MiB",
             status.scenes,
             mebibytes(status.scene_bytes),
+            status.traced_canopies,
+            mebibytes(status.traced_canopy_bytes),
             mebibytes(status.result_bytes)
         ),
     );

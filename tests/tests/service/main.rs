@@ -19,5 +19,6 @@ mod missed;
 mod neighbours;
 mod numbers;
 mod python;
+mod residents;
 mod results;
 mod stopping;

@@ -11,8 +11,14 @@ use nestrad_tests::processes::{Master, until};
 #[test]
 fn a_thousand_solves_through_one_master_leave_nothing_behind() {
     // room for some hundred scenes and results
-    let memory = ["--scene-memory", "0.0005", "--result-memory", "0.0005"];
-    let master = Master::start(&memory);
+    let master = Master::start(&[
+        "--scene-memory",
+        "0.0005",
+        "--result-memory",
+        "0.0005",
+        "--resident-memory",
+        "0.0005",
+    ]);
     let begun = Instant::now();
     let solve = |k: u32| {
         block_on(async {
@@ -59,6 +65,7 @@ fn a_thousand_solves_through_one_master_leave_nothing_behind() {
     let bound = 0.0005 * (1u64 << 30) as f64;
     assert!(master.metric("nestrad_scene_bytes") <= bound);
     assert!(master.metric("nestrad_result_bytes") <= bound);
+    assert!(master.metric("nestrad_traced_canopy_bytes") <= bound);
     assert!(more < 4e6, "{more} bytes more");
     // a loaded machine may close what the last metric was read through a little later
     until("files are closed", || {

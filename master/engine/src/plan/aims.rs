@@ -88,6 +88,16 @@ impl Aims {
         }
     }
 
+    /// The same with elements and soil cells as in others.
+    #[must_use]
+    pub fn with_elements_of(&self, others: &Self) -> Self {
+        Self {
+            elements_percent: others.elements_percent,
+            soil_percent: others.soil_percent,
+            ..*self
+        }
+    }
+
     /// Whether others ask for nothing else of how a canopy is traced.
     pub fn trace_as(&self, other: &Self) -> bool {
         let traced = |aims: &Self| {
@@ -100,14 +110,14 @@ impl Aims {
         traced(self) == traced(other)
     }
 
-    /// The same with what takes memory coarser by a factor, and nothing else: one way down for all who ask for more
-    /// than there is memory for, so that who asks for more is not given less.
+    /// The same with all that takes memory as in others: there is one row of plans for all who ask for more than
+    /// there is memory for, so that who asks for more is not given less.
     #[must_use]
-    pub fn coarser(&self, factor: f64) -> Self {
+    pub fn with_memory_of(&self, others: &Self) -> Self {
         Self {
-            exchange_percent: self.exchange_percent * factor,
-            elements_percent: self.elements_percent * factor,
-            soil_percent: self.soil_percent * factor,
+            exchange_percent: others.exchange_percent,
+            elements_percent: others.elements_percent,
+            soil_percent: others.soil_percent,
             thin: true,
             ..*self
         }
@@ -117,9 +127,12 @@ impl Aims {
     #[must_use]
     pub fn quicker(&self, factor: f64) -> Self {
         Self {
+            exchange_percent: self.exchange_percent * factor,
             direct_percent: self.direct_percent * factor,
             sky_percent: self.sky_percent * factor,
-            ..self.coarser(factor)
+            elements_percent: self.elements_percent * factor,
+            soil_percent: self.soil_percent * factor,
+            thin: true,
         }
     }
 

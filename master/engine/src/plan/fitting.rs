@@ -1,13 +1,13 @@
 //! The finest plan that fits: where memory is short, what takes it is coarser than what was asked for.
 
-use super::{Aims, Plan, PlanError, Scale, Settings, asked};
+use super::{Aims, LEAST_ACCURACY_PERCENT, Plan, PlanError, Scale, Settings, asked, in_rounds};
 use crate::lit_canopy::LitCanopy;
 
-/// No plan is coarser than what is asked for by more than this.
-const COARSEST: f64 = 200.0;
+/// No plan is coarser than for this error, percent.
+const COARSEST_PERCENT: f64 = 100.0;
 
-/// Halvings of the way down: to half a per cent of the error that is planned for.
-const HALVINGS: usize = 10;
+/// Halvings of the way from the finest plan to it: to half a per cent of the error that is planned for.
+const HALVINGS: usize = 11;
 
 impl Plan {
     /// For the accuracy of the settings, or as near to it as memory allows.
@@ -36,8 +36,10 @@ impl Plan {
             Err(error) if error.is_of_size() => {}
             done => return done,
         }
-        let coarser = |factor: f64| Self::of_scale(lit, settings, &aims.coarser(factor), scale);
-        finest(COARSEST, coarser)
+        finest(|percent| {
+            let aims = aims.with_memory_of(&in_rounds(lit.canopy, percent, &scale));
+            Self::of_scale(lit, settings, &aims, scale)
+        })
     }
 
     /// Whether something is coarser than it would be if no limit were short.
@@ -53,11 +55,11 @@ impl PlanError {
     }
 }
 
-/// The plan of the smallest factor, from 1 to `most`, that is not too large. Larger factors are taken to give smaller
-/// plans.
-fn finest(most: f64, coarser: impl Fn(f64) -> Result<Plan, PlanError>) -> Result<Plan, PlanError> {
+/// The plan for the smallest error that is not too large. Larger errors are taken to give smaller plans.
+fn finest(planned: impl Fn(f64) -> Result<Plan, PlanError>) -> Result<Plan, PlanError> {
     let (mut low, mut high) = (0.0, 1.0);
-    let at = |part: f64| coarser(most.powf(part));
+    let ratio = COARSEST_PERCENT / LEAST_ACCURACY_PERCENT;
+    let at = |part: f64| planned(LEAST_ACCURACY_PERCENT * f64::powf(ratio, part));
     let mut best = at(high)?;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);

@@ -425,11 +425,17 @@ impl Plan {
 
 /// What is aimed at where nothing stands against it.
 fn asked(canopy: &Canopy, settings: &Settings, scale: &Scale) -> Aims {
-    let aims = Aims::of(settings.accuracy_percent);
-    if !settings.in_rounds {
-        return aims;
+    if settings.in_rounds {
+        in_rounds(canopy, settings.accuracy_percent, scale)
+    } else {
+        Aims::of(settings.accuracy_percent)
     }
-    let aims = elements::fine_enough(aims, settings.accuracy_percent, scale);
+}
+
+/// What the first round for an accuracy aims at.
+fn in_rounds(canopy: &Canopy, accuracy_percent: f64, scale: &Scale) -> Aims {
+    let aims = Aims::of(accuracy_percent);
+    let aims = elements::fine_enough(aims, accuracy_percent, scale);
     sampling::with_a_margin(aims, canopy, scale)
 }
 

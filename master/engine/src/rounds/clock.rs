@@ -23,6 +23,9 @@ const SAFE: f64 = 0.85;
 /// The first one this part, because this machine is not known yet.
 const SAFE_AT_FIRST: f64 = 0.4;
 
+/// After this part of the budget, a first round that is not done gives way to a much quicker one.
+const GIVES_WAY: f64 = 0.6;
+
 /// What the first round may overrun the budget by: parts of it, or seconds where that is more.
 const OVERRUN: f64 = 0.08;
 const OVERRUN_S: f64 = 0.35;
@@ -69,16 +72,28 @@ impl Clock {
         self.slower = took_s / all_s(lit, plan).max(f64::MIN_POSITIVE);
     }
 
-    /// Stops a round that is not done in time; the first one, without which there is nothing, a bit later.
-    pub(super) fn alarm(&self, is_first: bool, stop: &Stop) -> Option<Alarm> {
-        let more_s = if is_first {
-            (OVERRUN * self.budget_s).max(OVERRUN_S)
-        } else {
-            0.0
+    /// Stops a round that is not done in time.
+    pub(super) fn alarm(&self, until: Until, stop: &Stop) -> Option<Alarm> {
+        let end_s = match until {
+            Until::GivesWay => GIVES_WAY * self.budget_s,
+            Until::End => self.budget_s,
+            Until::PastTheEnd => self.budget_s + (OVERRUN * self.budget_s).max(OVERRUN_S),
         };
-        let left = Duration::try_from_secs_f64((self.left_s() + more_s).max(0.0)).ok()?;
+        let left_s = end_s - self.begun.elapsed().as_secs_f64();
+        let left = Duration::try_from_secs_f64(left_s.max(0.0)).ok()?;
         Alarm::in_time(left, stop)
     }
+}
+
+/// How long a round may go on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Until {
+    /// A quicker one can still be done.
+    GivesWay,
+    /// The time that the user allows is over.
+    End,
+    /// The same and a bit more: without this round there is nothing.
+    PastTheEnd,
 }
 
 /// Stops some work when its time is up; dropped before that, it does not.

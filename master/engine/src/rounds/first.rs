@@ -1,10 +1,11 @@
 //! The first round: what is asked for, or a coarse look where that saves; or the best that memory and time allow.
 
+use nestrad_common::light::Sources;
 use nestrad_common::scene::Scene;
 
 use super::clock::Clock;
 use super::limits::Planned;
-use super::work::work_s;
+use super::work::{all_s, work_s};
 use super::{lit_canopy, sources_for};
 use crate::plan::{Aims, Plan, PlanError, Settings, WorkCounts};
 
@@ -23,19 +24,22 @@ pub(super) fn first(
     let aims = Aims::of(settings.accuracy_percent);
     let sources = sources_for(scene, &aims, settings);
     let plan = Plan::fitting(&lit_canopy(scene, &sources), settings);
-    if !settings.in_rounds {
+    // what a limit shapes is the same for all who ask for more than it allows: none of them ends with less
+    if !settings.in_rounds || plan.as_ref().is_ok_and(Plan::is_limited) {
         return Ok((sources, plan?));
     }
     let aims = Aims::pilot(settings.accuracy_percent);
     let coarse = sources_for(scene, &aims, settings);
     let look = Plan::aimed(&lit_canopy(scene, &coarse), settings, &aims);
-    let all_s = |sources, plan| {
+    let takes_s = |sources, plan| {
         let counts = WorkCounts::of(&lit_canopy(scene, sources), plan);
         work_s(&counts).iter().sum::<f64>()
     };
     match (plan, look) {
         // it may not need as much as it was planned with
-        (Ok(plan), Ok(look)) if all_s(&coarse, &look) < WORTH_A_LOOK * all_s(&sources, &plan) => {
+        (Ok(plan), Ok(look))
+            if takes_s(&coarse, &look) < WORTH_A_LOOK * takes_s(&sources, &plan) =>
+        {
             Ok((coarse, look))
         }
         (plan, _) => Ok((sources, plan?)),
@@ -45,17 +49,13 @@ pub(super) fn first(
 /// Where time is short, a coarse look comes first always; where not even that leaves time for more, a coarser one.
 fn in_time(scene: &Scene, settings: &Settings, clock: &Clock) -> Result<Planned, PlanError> {
     let pilot = Aims::pilot(settings.accuracy_percent);
-    let planned = |aims: &Aims| {
-        let sources = sources_for(scene, aims, settings);
-        let plan = Plan::fitting_aims(&lit_canopy(scene, &sources), settings, aims)?;
-        Ok::<Planned, PlanError>((sources, plan))
-    };
+    let planned = |aims: &Aims| planned(scene, settings, aims);
     let allows = |(sources, plan): &Planned| clock.allows_first(&lit_canopy(scene, sources), plan);
     let look = planned(&pilot)?;
     if allows(&look) {
         return Ok(look);
     }
-    let mut best = planned(&pilot.quicker(QUICKEST))?;
+    let mut best = quickest(scene, settings)?;
     if !allows(&best) {
         let (sources, plan) = &best;
         let lit = lit_canopy(scene, sources);
@@ -80,6 +80,34 @@ fn in_time(scene: &Scene, settings: &Settings, clock: &Clock) -> Result<Planned,
     }
     Ok(best)
 }
+
+/// The plan of the coarsest look.
+fn quickest(scene: &Scene, settings: &Settings) -> Result<Planned, PlanError> {
+    let pilot = Aims::pilot(settings.accuracy_percent);
+    planned(scene, settings, &pilot.quicker(QUICKEST))
+}
+
+fn planned(scene: &Scene, settings: &Settings, aims: &Aims) -> Result<Planned, PlanError> {
+    let sources = sources_for(scene, aims, settings);
+    let plan = Plan::fitting_aims(&lit_canopy(scene, &sources), settings, aims)?;
+    Ok((sources, plan))
+}
+
+/// What is begun in place of a first round that takes far longer than it should, if there is something that is
+/// quicker by much: this machine is slower than it was taken for, or others use it too.
+pub(super) fn in_place_of(
+    (sources, plan): (&Sources, &Plan),
+    scene: &Scene,
+    settings: &Settings,
+) -> Option<Planned> {
+    let quickest = quickest(scene, settings).ok()?;
+    let takes_s = |sources, plan| all_s(&lit_canopy(scene, sources), plan);
+    let is_quicker = takes_s(&quickest.0, &quickest.1) < MUCH_QUICKER * takes_s(sources, plan);
+    is_quicker.then_some(quickest)
+}
+
+/// Part of a plan's time that a much quicker one takes at most.
+const MUCH_QUICKER: f64 = 0.5;
 
 /// No look is coarser than another by more than this.
 const QUICKEST: f64 = 20.0;

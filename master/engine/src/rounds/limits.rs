@@ -3,11 +3,13 @@
 use nestrad_common::light::Sources;
 use nestrad_common::scene::Scene;
 
+use super::accuracy::worst;
 use super::clock::Clock;
 use super::next::Measured;
 use super::work::PerPart;
 use super::{Ended, lit_canopy, sources_for};
 use crate::plan::{Aims, Plan, PlanError, Settings};
+use crate::solution::BandAccount;
 
 /// The plan of a round, and its sources.
 pub(super) type Planned = (Sources, Plan);
@@ -44,20 +46,41 @@ impl Choice<'_> {
             Err(Unfit::Memory | Unfit::Other) => Ended::BeyondLimits,
         };
         let last = self.measured.aims;
-        // what memory stands against must not keep it from helping the rest
-        let way = |part: f64| match ended {
-            Ended::OutOfTime => self.measured.aims(&finer.map(|factor| factor.powf(part))),
-            _ => last.towards(&aims, part),
+        let candidates = if ended == Ended::OutOfTime {
+            vec![self.farthest(|part| self.for_part_of_the_way(part))]
+        } else {
+            // what memory stands against must not keep it from helping the rest
+            let way = |part: f64| last.towards(&aims, part);
+            let of_exchange = |part: f64| way(part).with_elements_of(&last);
+            let of_elements = |part: f64| Aims {
+                exchange_percent: last.exchange_percent,
+                ..way(part)
+            };
+            vec![
+                self.farthest(way),
+                self.farthest(of_exchange),
+                self.farthest(of_elements),
+            ]
         };
-        let candidates = [self.farthest(way), self.of_asked(&aims)];
         let better = |round: &Planned| self.measured.predicted_percent(&round.1.aims);
         let best = candidates
             .into_iter()
+            .chain([self.of_asked(&aims)])
             .flatten()
             .min_by(|a, b| better(a).total_cmp(&better(b)));
         let reached = self.measured.predicted_percent(&last);
         best.filter(|round| better(round) < WORTH * reached)
             .ok_or(ended)
+    }
+
+    /// The cheapest round for an error between what was reached and what is asked for. It does not depend on what is
+    /// asked for but by the time that is left: who asks for more goes the same way, as far or farther.
+    fn for_part_of_the_way(&self, part: f64) -> Aims {
+        let reached = worst(self.measured.errors).map_or(0.0, BandAccount::total_percent);
+        let asked = self.settings.accuracy_percent;
+        let target = reached * (asked / reached.max(asked)).powf(part);
+        let finer = self.measured.finer(target);
+        finer.map_or(self.measured.aims, |finer| self.measured.aims(&finer))
     }
 
     /// As far on a way as fits.

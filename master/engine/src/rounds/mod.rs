@@ -31,8 +31,8 @@ use crate::stopwatch::Stopwatch;
 use crate::traced::{SolveError, WorkDone};
 use accuracy::worst;
 pub use accuracy::{Accuracy, Ended, Round};
-use clock::Clock;
-use first::first;
+use clock::{Clock, Until};
+use first::{first, in_place_of};
 use limits::Choice;
 use next::Measured;
 use work::{PARTS, work_s};
@@ -110,8 +110,9 @@ pub fn solve_in_rounds(
     light_in_rounds((scene, resident), settings, rows, run, watch, begins)
 }
 
-/// The same with a canopy that may be resident, and is so afterwards if there is room. It begins as finely as it was
-/// traced: another light traces nothing unless it needs more.
+/// The same with a canopy that may be resident, and is so afterwards if there is room: another light traces nothing.
+/// Rounds begin as finely as it was traced, and trace only what needs more; then a result depends on the lights before.
+/// Without rounds it does not: the plan of a canopy is the same for every light.
 pub fn light_in_rounds(
     (scene, resident): (&Scene, &mut Resident),
     settings: &Settings,
@@ -147,9 +148,14 @@ fn rounds(
     begins: &mut impl FnMut(&Plan, &[Round]),
 ) -> Result<Solved, RoundsError> {
     let asked = settings.accuracy_percent;
-    let (mut sources, mut plan) = match resident.traced_for(&scene.canopy, settings) {
+    let traced = resident.traced_for(&scene.canopy, settings);
+    let (mut sources, mut plan) = match traced.filter(|_| settings.in_rounds) {
         Some(traced) => again(scene, settings, traced)?,
         None => first(scene, settings, clock.as_ref())?,
+    };
+    let mut instead = match clock {
+        Some(_) => in_place_of((&sources, &plan), scene, settings),
+        None => None,
     };
     let mut rounds = Vec::new();
     let mut best: Option<Solved> = None;
@@ -161,9 +167,12 @@ fn rounds(
         let lit = lit_canopy(scene, &sources);
         let canopy = (&scene.canopy, settings);
         let in_time = run.stop.part();
-        let alarm = clock
-            .as_ref()
-            .and_then(|c| c.alarm(best.is_none(), &in_time));
+        let until = match (&best, &instead) {
+            (Some(_), _) => Until::End,
+            (None, Some(_)) => Until::GivesWay,
+            (None, None) => Until::PastTheEnd,
+        };
+        let alarm = clock.as_ref().and_then(|c| c.alarm(until, &in_time));
         let timed = Run {
             stop: &in_time,
             ..*run
@@ -190,6 +199,12 @@ fn rounds(
             }
             (Err(SolveError::Stopped(_)), None) => {
                 let needed_s = round_begun.elapsed().as_secs_f64();
+                if let (Some(quicker), Some(clock)) = (instead.take(), clock.as_mut()) {
+                    clock.learn(&lit, &plan, needed_s);
+                    (sources, plan) = quicker;
+                    best = None;
+                    continue;
+                }
                 let limit_s = settings.budget_s.unwrap_or_default();
                 return Err(PlanError::Overtime { needed_s, limit_s }.into());
             }

@@ -197,7 +197,8 @@ impl Group<'_> {
         for (half, from) in all.halves.iter_mut().zip([&pass.x, &pass.y]) {
             for (row, lane) in from.irradiance.iter().enumerate() {
                 for k in 0..self.bands.len() {
-                    half[row * all.bands + first + k] = lane[k];
+                    // where hardly any light comes, the iterate may be below 0 by a rounding
+                    half[row * all.bands + first + k] = lane[k].max(0.0);
                 }
             }
         }

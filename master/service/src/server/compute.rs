@@ -8,7 +8,7 @@ use nestrad_common::panics;
 use nestrad_engine::causes::causes;
 use nestrad_engine::heap::Freed;
 use nestrad_engine::plan::Plan;
-use nestrad_engine::rounds::{Round, RoundsError, solve_in_rounds};
+use nestrad_engine::rounds::{Round, RoundsError, light_in_rounds, solve_in_rounds};
 use nestrad_engine::run::Run;
 use nestrad_engine::stopwatch::Stopwatch;
 use nestrad_engine::traced::FailureKind;
@@ -16,6 +16,7 @@ use rayon::ThreadPool;
 use thiserror::Error;
 
 use super::metrics::Metrics;
+use super::residents::Residents;
 use super::scenes::HeldScene;
 use super::solution::HeldSolution;
 use super::solve::{Phase, Solve};
@@ -27,6 +28,8 @@ pub(super) struct Means<'a> {
     /// Those that may come: a master without workers computes by itself.
     pub(super) workers: &'a Cluster,
     pub(super) kept: Option<&'a Store>,
+    /// Canopies that other solves have traced.
+    pub(super) residents: &'a Residents,
 }
 
 /// Solves what is in the queue, one solve after the other, until the master stops. Whatever happens in between, a
@@ -105,8 +108,19 @@ fn solution(solve: &Solve, means: &Means, held: &HeldScene) -> Result<HeldSoluti
     let begins = |plan: &Plan, _: &[Round]| solve.set_plan(&plan.reasons);
     let workers = means.workers.has_workers().then_some(means.workers);
     let scene = held.scene();
+    let settings = &solve.settings;
     let solved = with_rows(workers, means.kept, |rows| {
-        solve_in_rounds(&scene, &solve.settings, rows, &run, &mut watch, begins)
+        // rounds would begin with what is there, and their result would depend on the solves before
+        if settings.in_rounds {
+            return solve_in_rounds(&scene, settings, rows, &run, &mut watch, begins);
+        }
+        let untrusted = || means.workers.status().untrusted.len();
+        let geometry = held.geometry().id;
+        let mut used = means.residents.take(geometry, settings, untrusted());
+        let lit = (&scene, &mut used.resident);
+        let solved = light_in_rounds(lit, settings, rows, &run, &mut watch, begins);
+        means.residents.give_back(used, untrusted());
+        solved
     })?;
     let usage = watch.usage();
     Ok(HeldSolution::new(held, solved, watch.stages(), usage)?)

@@ -7,6 +7,8 @@ pub struct ServiceLimits {
     pub scene_bytes: u64,
     /// Memory of the results that are held, bytes.
     pub result_bytes: u64,
+    /// Memory of the canopies that stay traced, bytes; 0 for none.
+    pub resident_bytes: u64,
     /// Memory of one solve, GiB.
     pub solve_GiB: f64,
     /// Solves that are computed at a time; at least 1.

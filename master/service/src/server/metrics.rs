@@ -39,6 +39,8 @@ struct Held {
     solves: Family<OfState, Gauge>,
     scenes: Gauge,
     scene_bytes: Gauge,
+    traced_canopies: Gauge,
+    traced_canopy_bytes: Gauge,
     result_bytes: Gauge,
     workers: Gauge,
     worker_threads: Gauge,
@@ -66,6 +68,8 @@ pub(super) struct Now {
     pub(super) ended: usize,
     pub(super) scenes: usize,
     pub(super) scene_bytes: u64,
+    pub(super) traced_canopies: usize,
+    pub(super) traced_canopy_bytes: u64,
     pub(super) result_bytes: u64,
     pub(super) workers: ClusterStatus,
     pub(super) traffic: Traffic,
@@ -162,6 +166,16 @@ impl Metrics {
             "scene_bytes",
             "Memory of all scenes that are held or in use",
             held.scene_bytes.clone(),
+        );
+        registry.register(
+            "traced_canopies",
+            "Canopies that stay traced for another light",
+            held.traced_canopies.clone(),
+        );
+        registry.register(
+            "traced_canopy_bytes",
+            "Memory of all canopies that stay traced",
+            held.traced_canopy_bytes.clone(),
         );
         registry.register(
             "result_bytes",
@@ -292,6 +306,9 @@ impl Metrics {
         }
         held.scenes.set(now.scenes as i64);
         held.scene_bytes.set(now.scene_bytes as i64);
+        held.traced_canopies.set(now.traced_canopies as i64);
+        let bytes = now.traced_canopy_bytes as i64;
+        held.traced_canopy_bytes.set(bytes);
         held.result_bytes.set(now.result_bytes as i64);
         held.cluster(&now.workers);
         held.traffic(&now.traffic);

@@ -16,6 +16,7 @@ mod limits;
 mod lock;
 mod metrics;
 mod metrics_port;
+mod residents;
 mod rpc;
 mod scenes;
 mod serve;

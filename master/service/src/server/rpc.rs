@@ -20,6 +20,7 @@ use super::held::HeldCanopy;
 use super::identity::Id;
 use super::intake::{Upload, lighting, organ_bytes, settings, triangle_bytes};
 use super::metrics::Metrics;
+use super::residents::Residents;
 use super::scenes::Scenes;
 use super::slices;
 use super::solve::{Phase, Solve};
@@ -40,6 +41,7 @@ const TELL_EVERY: Duration = Duration::from_millis(200);
 pub(super) struct Rpc {
     pub(super) scenes: Arc<Scenes>,
     pub(super) solves: Arc<Solves>,
+    pub(super) residents: Arc<Residents>,
     pub(super) metrics: Arc<Metrics>,
     pub(super) uploads: Uploads,
     pub(super) workers: Cluster,
@@ -189,6 +191,7 @@ impl SolveService for Rpc {
         let (segments_per_s, rays_per_s) = self.metrics.rates();
         let cluster = self.workers.status();
         let solves = self.solves.all();
+        let (traced_canopies, traced_canopy_bytes) = self.residents.count_and_bytes();
         Ok(Response::new(v1::StatusResponse {
             version: env!("CARGO_PKG_VERSION").to_owned(),
             uptime_s: self.started.elapsed().as_secs_f64(),
@@ -204,6 +207,8 @@ impl SolveService for Rpc {
             scene_bytes: self.scenes.bytes(),
             result_bytes: self.solves.result_bytes(),
             jobs_audited: cluster.audited,
+            traced_canopies: traced_canopies as u64,
+            traced_canopy_bytes,
             untrusted_workers: cluster.untrusted.iter().map(|w| w.to_string()).collect(),
         }))
     }

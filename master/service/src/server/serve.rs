@@ -24,6 +24,7 @@ use super::compute::{self, Means};
 use super::limits::ServiceLimits;
 use super::metrics::{Metrics, Now};
 use super::metrics_port::MetricsPort;
+use super::residents::Residents;
 use super::rpc::Rpc;
 use super::scenes::Scenes;
 use super::solve::Phase;
@@ -40,6 +41,7 @@ pub struct Service {
     limits: ServiceLimits,
     scenes: Arc<Scenes>,
     solves: Arc<Solves>,
+    residents: Arc<Residents>,
     metrics: Arc<Metrics>,
     pool: Arc<ThreadPool>,
     workers: Cluster,
@@ -101,6 +103,7 @@ impl Service {
             limits,
             scenes: Arc::new(Scenes::new(limits.scene_bytes)),
             solves: Arc::new(Solves::new(bounds, limits.solves.max(1))),
+            residents: Arc::new(Residents::new(limits.resident_bytes)),
             metrics: Arc::default(),
             pool: Arc::new(pool),
             workers,
@@ -130,6 +133,7 @@ impl Service {
         let rpc = Rpc {
             scenes: self.scenes.clone(),
             solves: self.solves.clone(),
+            residents: self.residents.clone(),
             metrics: self.metrics.clone(),
             uploads: Uploads::new(),
             workers: self.workers.clone(),
@@ -186,6 +190,7 @@ impl Service {
             pool: &self.pool,
             workers: &self.workers,
             kept: self.kept.as_ref(),
+            residents: &self.residents,
         };
         let may_die = || self.supervisor.may_die(&format!("solve-{k}"));
         compute::work(&self.solves, &means, &self.metrics, may_die);
@@ -242,12 +247,15 @@ impl Service {
         let solves = self.solves.all();
         let count =
             |of: fn(&Phase) -> bool| solves.iter().filter(|solve| of(&solve.phase())).count();
+        let (traced_canopies, traced_canopy_bytes) = self.residents.count_and_bytes();
         self.metrics.text(&Now {
             queued: count(|state| matches!(state, Phase::Queued)),
             running: count(|state| matches!(state, Phase::Running)),
             ended: count(Phase::has_ended),
             scenes: self.scenes.count(),
             scene_bytes: self.scenes.bytes(),
+            traced_canopies,
+            traced_canopy_bytes,
             result_bytes: self.solves.result_bytes(),
             workers: self.workers.status(),
             traffic: self.connections.traffic(),

@@ -82,6 +82,7 @@ async fn of_which_dies(
     let limits = ServiceLimits {
         scene_bytes: 1 << 20,
         result_bytes: 1 << 20,
+        resident_bytes: 1 << 20,
         solve_GiB: 1.0,
         solves: 1,
         queue: 10,
