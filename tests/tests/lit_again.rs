@@ -333,9 +333,11 @@ fn under(scene: &Scene, other: &Scene) -> Scene {
     }
 }
 
-fn every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(settings: &Settings) {
+fn every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(
+    settings: &Settings,
+    resident: &mut Resident,
+) {
     let day = maize();
-    let resident = &mut Resident::within(1 << 30);
     let lights = [day.clone(), under(&day, &overcast_maize()), day.clone()];
     let mut traced = Vec::new();
     for scene in &lights {
@@ -349,7 +351,8 @@ fn every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(settings: &
 
 #[test]
 fn a_resident_canopy_traces_nothing_for_another_light() {
-    every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(&coarse());
+    let resident = &mut Resident::within(1 << 30);
+    every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(&coarse(), resident);
 }
 
 #[test]
@@ -359,7 +362,28 @@ fn a_resident_canopy_begins_as_finely_as_its_rounds_have_ended() {
         in_rounds: true,
         ..Settings::default()
     };
-    every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(&settings);
+    let resident = &mut Resident::within(1 << 30).going_on();
+    every_light_of_a_resident_canopy_gives_the_bits_of_its_plan_alone(&settings, resident);
+}
+
+/// A master must give the same bits whatever it has solved before.
+#[test]
+fn rounds_that_do_not_go_on_have_the_bits_of_a_solve_alone() {
+    let day = maize();
+    let resident = &mut Resident::within(1 << 30);
+    for (scene, accuracy_percent) in [(&day, 3.0), (&under(&day, &overcast_maize()), 1.0)] {
+        let settings = Settings {
+            accuracy_percent,
+            in_rounds: true,
+            ..Settings::default()
+        };
+        for _ in 0..2 {
+            let again = light(scene, &settings, resident);
+            let alone = light(scene, &settings, &mut Resident::within(0));
+            assert!(again.solution == alone.solution);
+            assert_eq!(again.accuracy, alone.accuracy);
+        }
+    }
 }
 
 #[test]

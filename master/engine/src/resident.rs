@@ -18,6 +18,7 @@ use crate::traced::{SolveError, TracedCanopy, WorkDone, solve_and_keep};
 pub struct Resident {
     most_bytes: u64,
     keeps_directions: bool,
+    goes_on: bool,
     held: Option<Held>,
 }
 
@@ -44,7 +45,18 @@ impl Resident {
         Self {
             most_bytes,
             keeps_directions: true,
+            goes_on: false,
             held: None,
+        }
+    }
+
+    /// The same, where rounds begin as finely as the canopy was traced for the lights before: other lights hardly ever
+    /// trace anything, but where one has made it finer, the next has other bits than it would have alone.
+    #[must_use]
+    pub fn going_on(self) -> Self {
+        Self {
+            goes_on: true,
+            ..self
         }
     }
 
@@ -53,6 +65,7 @@ impl Resident {
         Self {
             most_bytes: u64::MAX,
             keeps_directions: false,
+            goes_on: false,
             held: None,
         }
     }
@@ -67,8 +80,8 @@ impl Resident {
         self.held.as_ref().map_or(0, Held::bytes)
     }
 
-    /// How the canopy was traced and for what, if it is resident and was traced as these settings have it.
-    pub fn traced_for(
+    /// How the canopy was traced and for what, if rounds by these settings go on from there.
+    pub(crate) fn goes_on_with(
         &self,
         canopy: &Arc<Canopy>,
         settings: &Settings,
@@ -79,7 +92,8 @@ impl Resident {
             memory_GiB: settings.memory_GiB,
             ..held.settings
         };
-        let fits = is_same(&held.canopy, canopy) && own == *settings;
+        let goes_on = self.goes_on && settings.in_rounds;
+        let fits = goes_on && is_same(&held.canopy, canopy) && own == *settings;
         fits.then_some((&held.plan, &held.aims))
     }
 

@@ -111,8 +111,7 @@ pub fn solve_in_rounds(
 }
 
 /// The same with a canopy that may be resident, and is so afterwards if there is room: another light traces nothing.
-/// Rounds begin as finely as it was traced, and trace only what needs more; then a result depends on the lights before.
-/// Without rounds it does not: the plan of a canopy is the same for every light.
+/// See [`Resident::going_on`] for rounds.
 pub fn light_in_rounds(
     (scene, resident): (&Scene, &mut Resident),
     settings: &Settings,
@@ -148,8 +147,7 @@ fn rounds(
     begins: &mut impl FnMut(&Plan, &[Round]),
 ) -> Result<Solved, RoundsError> {
     let asked = settings.accuracy_percent;
-    let traced = resident.traced_for(&scene.canopy, settings);
-    let (mut sources, mut plan) = match traced.filter(|_| settings.in_rounds) {
+    let (mut sources, mut plan) = match resident.goes_on_with(&scene.canopy, settings) {
         Some(traced) => again(scene, settings, traced)?,
         None => first(scene, settings, clock.as_ref())?,
     };

@@ -8,7 +8,7 @@ use nestrad_common::panics;
 use nestrad_engine::causes::causes;
 use nestrad_engine::heap::Freed;
 use nestrad_engine::plan::Plan;
-use nestrad_engine::rounds::{Round, RoundsError, light_in_rounds, solve_in_rounds};
+use nestrad_engine::rounds::{Round, RoundsError, light_in_rounds};
 use nestrad_engine::run::Run;
 use nestrad_engine::stopwatch::Stopwatch;
 use nestrad_engine::traced::FailureKind;
@@ -110,10 +110,6 @@ fn solution(solve: &Solve, means: &Means, held: &HeldScene) -> Result<HeldSoluti
     let scene = held.scene();
     let settings = &solve.settings;
     let solved = with_rows(workers, means.kept, |rows| {
-        // rounds would begin with what is there, and their result would depend on the solves before
-        if settings.in_rounds {
-            return solve_in_rounds(&scene, settings, rows, &run, &mut watch, begins);
-        }
         let untrusted = || means.workers.status().untrusted.len();
         let geometry = held.geometry().id;
         let mut used = means.residents.take(geometry, settings, untrusted());

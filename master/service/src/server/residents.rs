@@ -135,11 +135,11 @@ mod tests {
     use super::super::identity::solve_id;
     use super::*;
 
-    /// A leaf over soil, so high.
-    fn leaf(z_m: f64) -> Scene {
+    /// A leaf over soil.
+    fn leaf() -> Scene {
         let corners = [DVec3::ZERO, DVec3::X, DVec3::Y];
         let triangle = Triangle {
-            corners_m: corners.map(|p| 0.1 * p + z_m * DVec3::Z),
+            corners_m: corners.map(|p| 0.1 * p + 0.1 * DVec3::Z),
             organ: 0,
             material: 0,
         };
@@ -170,7 +170,7 @@ mod tests {
         solve_id(0, scene)
     }
 
-    /// Solves a scene; whether it had to be traced. So many workers are known to be wrong before and after.
+    /// Solves a leaf under this name; whether it had to be traced. So many workers are known to be wrong before and after.
     fn traces(residents: &Residents, scene: u64, untrusted: [usize; 2]) -> bool {
         let settings = Settings::default();
         let mut used = residents.take(id(scene), &settings, untrusted[0]);
@@ -178,7 +178,7 @@ mod tests {
             stop: &Stop::default(),
             progress: &Progress::default(),
         };
-        let (lit, rows) = (leaf(0.1 * scene as f64), ThisProcess::default());
+        let (lit, rows) = (leaf(), ThisProcess::default());
         let with = (&lit, &mut used.resident);
         let watch = &mut Stopwatch::start();
         let solved = light_in_rounds(with, &settings, &rows, &run, watch, |_, _| {});
