@@ -32,6 +32,8 @@ pub struct Inputs {
     pub bands: Vec<BandInput>,
     /// The light above the canopy.
     pub light: Option<LightInput>,
+    /// Which part of broadband irradiance each band gets, by its name, for weather: above 0 to 1.
+    pub band_fraction: BTreeMap<String, f64>,
     /// How to solve.
     pub options: Options,
 }
@@ -59,6 +61,11 @@ impl Inputs {
                 self.bands
             },
             light: self.light.or(other.light),
+            band_fraction: if self.band_fraction.is_empty() {
+                other.band_fraction
+            } else {
+                self.band_fraction
+            },
             options: self.options.over(other.options),
         }
     }
@@ -93,6 +100,8 @@ pub struct BandInput {
     pub soil_albedo: Option<f64>,
     /// Materials by name (OBJ).
     pub materials: BTreeMap<String, LeafOptics>,
+    /// Photons of a joule, µmol, where they were given or follow from wavelengths.
+    pub photon_umol_J: Option<f64>,
     /// Where the band is written down, if in a scene file.
     pub place: Option<Place>,
 }

@@ -24,3 +24,4 @@ pub mod panics;
 pub mod printable;
 pub mod scene;
 pub mod threads;
+pub mod weather;

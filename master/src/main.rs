@@ -24,6 +24,8 @@ fn main() -> ExitCode {
         Command::Check(args) => args.run(),
         Command::Generate(args) => args.run(),
         Command::Report(args) => args.run(),
+        Command::Series(args) => args.run(),
+        Command::Day(args) => args.run(),
         Command::Serve(args) => args.run(),
         Command::Status(args) => args.run(),
         Command::Trade(args) => args.run(),

@@ -6,6 +6,7 @@ use super::LoadError;
 use crate::bounded::Limit;
 use crate::formats::pattern::Rectangle;
 use crate::formats::read::{SMALL, read};
+use crate::formats::weather::Weather;
 use crate::formats::{self, FormatError, GeometryFile, Place};
 use crate::inputs::{Inputs, PatternInput};
 
@@ -25,6 +26,12 @@ pub fn load_scene_file(path: &Path) -> Result<Inputs, LoadError> {
     let bytes = read(path, SMALL, "a scene file (.toml)")?;
     let folder = path.parent().unwrap_or(Path::new(""));
     Ok(formats::scene_file::parse(&name(path), &bytes, folder)?)
+}
+
+/// Reads a weather file.
+pub fn load_weather(path: &Path) -> Result<Weather, LoadError> {
+    let bytes = read(path, SMALL, "weather (.csv)")?;
+    Ok(formats::weather::parse(&name(path), &bytes)?)
 }
 
 pub(super) fn read_geometry_file(path: &Path, limit: Limit) -> Result<GeometryFile, FormatError> {

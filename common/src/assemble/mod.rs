@@ -26,7 +26,7 @@ pub use bands::{BandOptics, resolve_band};
 pub use error::LoadError;
 pub use examine::{Examined, examine};
 use files::name;
-pub use files::{is_scene_file, load_scene_file};
+pub use files::{is_scene_file, load_scene_file, load_weather};
 pub use geometry::{Geometry, build_canopy};
 pub use lights::{LightFile, merge_sources};
 
@@ -35,6 +35,17 @@ pub use lights::{LightFile, merge_sources};
 pub struct Loaded {
     /// Canopy, optics and light.
     pub scene: Scene,
+    /// What is in it and what is odd about it.
+    pub inspection: Inspection,
+}
+
+/// A scene without its light.
+#[derive(Clone, Debug)]
+pub struct Unlit {
+    /// The geometry.
+    pub canopy: Arc<Canopy>,
+    /// What its surfaces do with the light of each band.
+    pub optics: Arc<Optics>,
     /// What is in it and what is odd about it.
     pub inspection: Inspection,
 }
@@ -52,29 +63,53 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
         });
     };
     light.check()?;
+    let with_light = || self::light(light, &bands);
+    let (unlit, light) = unlit(inputs, with_light)?;
+    let mut inspection = unlit.inspection;
+    inspection.add_light(&light, &unlit.optics.names());
+    Ok(Loaded {
+        scene: Scene {
+            canopy: unlit.canopy,
+            optics: unlit.optics,
+            light: Arc::new(light),
+        },
+        inspection,
+    })
+}
 
-    // small files first: what is wrong with them should not wait for a canopy to be read
+/// Reads all files of `inputs` but those of its light.
+pub fn load_unlit(inputs: &Inputs) -> Result<Unlit, LoadError> {
+    inputs.options.check()?;
+    band_names(inputs)?;
+    if inputs.scenes.is_empty() {
+        return Err(NO_SCENE);
+    }
+    Ok(unlit(inputs, || Ok(()))?.0)
+}
+
+/// Reads small files first, those of the light among them: what is wrong with them should not wait for a canopy to be
+/// read.
+fn unlit<T>(
+    inputs: &Inputs,
+    light: impl FnOnce() -> Result<T, LoadError>,
+) -> Result<(Unlit, T), LoadError> {
     let optics = inputs
         .bands
         .iter()
         .map(BandOptics::read)
         .collect::<Result<Vec<_>, _>>()?;
-    let light = self::light(light, &bands)?;
-    let (canopy, origins, mut inspection) = inspected(inputs)?;
+    let light = light()?;
+    let (canopy, origins, inspection) = inspected(inputs)?;
     let bands = optics
         .into_iter()
         .map(|optics| resolve_band(optics, &canopy, &origins))
         .collect::<Result<_, _>>()?;
-    let optics = Optics { bands };
-    inspection.add_light(&light, &optics.names());
-    Ok(Loaded {
-        scene: Scene {
-            canopy: Arc::new(canopy),
-            optics: Arc::new(optics),
-            light: Arc::new(light),
-        },
+    let unlit = Unlit {
+        canopy: Arc::new(canopy),
+        optics: Arc::new(Optics { bands }),
         inspection,
-    })
+    };
+    Ok((unlit, light))
 }
 
 const NO_SCENE: LoadError = LoadError::Missing {

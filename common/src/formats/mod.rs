@@ -18,6 +18,7 @@ pub mod pattern;
 pub mod polygon;
 pub mod read;
 pub mod scene_file;
+pub mod weather;
 
 pub use error::{FormatError, Place};
 pub(crate) use geometry_file::numbered;

@@ -4,7 +4,8 @@ use std::fmt;
 
 use thiserror::Error;
 
-use super::sky::Radiance;
+use super::perez::{BRIGHTNESS, CLEARNESS};
+use super::radiance::Radiance;
 use super::{AN_IRRADIANCE, Light, MIN_DESCENT, POINTS_DOWN, is_irradiance};
 
 /// How much the length of a direction may differ from 1.
@@ -51,6 +52,18 @@ pub enum LightError {
         of: Origin,
         /// In which the light travels.
         found: [f64; 3],
+    },
+    /// A sky that the model of Perez does not cover.
+    #[error("{value} of the sky: expected {least} to {most}, found {found}")]
+    Perez {
+        /// Which value.
+        value: &'static str,
+        /// The least that it may be.
+        least: f64,
+        /// The most that it may be.
+        most: f64,
+        /// As given.
+        found: f64,
     },
     /// A sky that is no part of the light.
     #[error("diffuse fraction: expected above 0 to 1, found {found}")]
@@ -106,11 +119,26 @@ impl Light {
             }
             each(Origin::Sky, 1.0, &sky.irradiance_W_m2)?;
             each(Origin::Sky, found, &sky.irradiance_W_m2)?;
-            if let Radiance::CieClear { towards_sun } = sky.radiance
+            if let Some(towards_sun) = sky.radiance.towards_sun()
                 && !((towards_sun.length() - 1.0).abs() <= LENGTH && towards_sun.z >= MIN_DESCENT)
             {
                 let (of, found) = (Origin::Sky, (-towards_sun).to_array());
                 return Err(LightError::Direction { of, found });
+            }
+            if let Radiance::Perez(perez) = sky.radiance {
+                for (value, (least, most), found) in [
+                    ("clearness", CLEARNESS, perez.clearness),
+                    ("brightness", BRIGHTNESS, perez.brightness),
+                ] {
+                    if !(least..=most).contains(&found) {
+                        return Err(LightError::Perez {
+                            value,
+                            least,
+                            most,
+                            found,
+                        });
+                    }
+                }
             }
         }
         for (number, band) in bands.into_iter().enumerate() {
@@ -194,7 +222,8 @@ mod tests {
             assert!(refusal(&light).starts_with("direction of source 0"));
             light.suns.clear();
             let sky = light.sky.as_mut().unwrap();
-            sky.radiance = Radiance::CieClear {
+            sky.radiance = Radiance::Cie {
+                kind: crate::light::CieType::CLEAR,
                 towards_sun: -direction,
             };
             assert!(refusal(&light).starts_with("direction of the sky"));

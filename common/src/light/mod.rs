@@ -1,6 +1,10 @@
 //! Light that falls on the canopy: parallel sources, and a sky.
 
+pub mod atmosphere;
 mod check;
+pub mod perez;
+pub mod photons;
+pub mod radiance;
 pub mod sky;
 mod spec;
 pub mod sun;
@@ -11,6 +15,7 @@ use std::num::NonZeroUsize;
 use glam::DVec3;
 
 pub use check::{LightError, Origin};
+pub use radiance::{CieType, Radiance};
 pub use sky::SkyLight;
 pub use spec::Sky;
 

@@ -6,7 +6,7 @@
 //! its band under a uniform sky, which is known exactly, times the sky's radiance where the
 //! direction points to.
 
-use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::f64::consts::{PI, TAU};
 use std::num::NonZeroUsize;
 
 use glam::DVec3;
@@ -14,6 +14,7 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use thiserror::Error;
 
+use super::radiance::{CieType, Radiance};
 use super::sun::{Sun, SunError};
 use super::{AN_IRRADIANCE, Light, Sky, Source, is_irradiance};
 
@@ -114,50 +115,18 @@ impl Sky {
                     return Err(SkyError::DiffuseFraction { value: diffuse });
                 }
                 let sun = Sun::at(time_utc, *latitude_deg, *longitude_deg)?;
-                let towards_sun = sun.towards();
-                let visible = (diffuse < 1.0).then_some(sun);
-                Ok((Radiance::CieClear { towards_sun }, diffuse, visible))
-            }
-        }
-    }
-}
-
-/// Radiance over the sky, in units of that of the zenith.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Radiance {
-    /// The same from everywhere.
-    Uniform,
-    /// Moon & Spencer 1942; also type 16 of the CIE standard (ISO 15469:2004).
-    MoonSpencer,
-    /// Type 12 of the CIE standard general sky (CIE S 011/E:2003, ISO 15469:2004): "CIE standard
-    /// clear sky, low illuminance turbidity".
-    CieClear {
-        /// Unit vector towards the sun, z > 0.
-        towards_sun: DVec3,
-    },
-}
-
-impl Radiance {
-    fn towards(self, direction: DVec3) -> f64 {
-        match self {
-            Self::Uniform => 1.0,
-            Self::MoonSpencer => (1.0 + 2.0 * direction.z) / 3.0,
-            Self::CieClear { towards_sun } => {
-                // gradation phi(Z) and indicatrix f(chi), with the parameters of type 12
-                let (a, b, c, d, e) = (-1.0, -0.32, 10.0, -3.0, 0.45);
-                let gradation = |cos_zenith: f64| 1.0 + a * f64::exp(b / cos_zenith);
-                let indicatrix = |cos_chi: f64| {
-                    let chi = cos_chi.clamp(-1.0, 1.0).acos();
-                    1.0 + c * (f64::exp(d * chi) - f64::exp(d * FRAC_PI_2)) + e * cos_chi * cos_chi
+                let radiance = Radiance::Cie {
+                    kind: CieType::CLEAR,
+                    towards_sun: sun.towards(),
                 };
-                gradation(direction.z) * indicatrix(direction.dot(towards_sun))
-                    / (gradation(1.0) * indicatrix(towards_sun.z))
+                let visible = (diffuse < 1.0).then_some(sun);
+                Ok((radiance, diffuse, visible))
             }
         }
     }
 }
 
-/// A direction and the irradiance of its band of the sky, for a zenith radiance of 1.
+/// A direction and the irradiance of its band of the sky, in the unit of the sky's radiance.
 struct SkyPart {
     towards: DVec3,
     irradiance: f64,

@@ -54,7 +54,8 @@ fn the_clear_sky_has_the_radiance_of_cie_type_12() {
         };
         sun.towards()
     };
-    let sky = Radiance::CieClear {
+    let sky = Radiance::Cie {
+        kind: CieType::CLEAR,
         towards_sun: at(60.0, 0.0),
     };
     assert!((sky.towards(DVec3::Z) - 1.0).abs() < 1e-14);

@@ -1,10 +1,12 @@
 //! Where the sun stands, from time and place.
 
 use glam::DVec3;
+use jiff::Timestamp;
+use jiff::tz::Offset;
 use solar_positioning::time::JulianDate;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t};
 use thiserror::Error;
-use toml::value::{Datetime, Offset};
+use toml::value::{Datetime, Offset as GivenOffset};
 
 use super::MIN_DESCENT;
 use crate::figures::fixed;
@@ -15,7 +17,7 @@ use crate::figures::fixed;
 /// (1013.25 hPa, 15 °C) is included. It lifts the sun by 0.02° at 40° and by 0.5° at the horizon.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sun {
-    /// Above the horizon, degrees; its sine is [`MIN_DESCENT`] or more.
+    /// Above the horizon, degrees; its sine is [`MIN_DESCENT`] or more where it [is up](Self::is_up).
     pub elevation_deg: f64,
     /// From north, clockwise (east is 90), degrees.
     pub azimuth_deg: f64,
@@ -34,23 +36,8 @@ impl Sun {
             longitude_deg,
             source,
         };
-        let location = Location {
-            latitude: latitude_deg,
-            longitude: longitude_deg,
-        };
-        let position = SolarPositions::new()
-            .at_from_julian(
-                julian_date(time_utc)?,
-                location,
-                0.0,
-                Some(RefractionCorrection::standard()),
-            )
-            .map_err(refused)?;
-        let sun = Self {
-            elevation_deg: position.elevation_angle(),
-            azimuth_deg: position.azimuth(),
-        };
-        if sun.towards().z < MIN_DESCENT {
+        let sun = stands(julian_date(time_utc)?, latitude_deg, longitude_deg).map_err(refused)?;
+        if !sun.is_up() {
             return Err(SunError::TooLow {
                 time_utc: time_utc.to_owned(),
                 latitude_deg,
@@ -59,6 +46,45 @@ impl Sun {
             });
         }
         Ok(sun)
+    }
+
+    /// The same at a moment, by day or night: below the horizon its elevation is negative, and so is what
+    /// [`MIN_DESCENT`] says of it not true.
+    pub fn by_day_or_night(
+        moment: Timestamp,
+        latitude_deg: f64,
+        longitude_deg: f64,
+    ) -> Result<Self, SunError> {
+        let refused = |source| SunError::Refused {
+            time_utc: moment.to_string(),
+            latitude_deg,
+            longitude_deg,
+            source,
+        };
+        let utc = Offset::UTC.to_datetime(moment);
+        let date = (i32::from(utc.year()), utc.month() as u32, utc.day() as u32);
+        let time = (utc.hour() as u32, utc.minute() as u32);
+        let seconds = f64::from(utc.second()) + 1e-9 * f64::from(utc.subsec_nanosecond());
+        julian(date, time, seconds)
+            .and_then(|date| stands(date, latitude_deg, longitude_deg))
+            .map_err(refused)
+    }
+
+    /// Whether it is high enough above the horizon to shine on a canopy.
+    pub fn is_up(&self) -> bool {
+        self.towards().z >= MIN_DESCENT
+    }
+
+    /// The same sun, lifted to the horizon where it stands below: what a sky at dusk is shaped by.
+    #[must_use]
+    pub fn lifted(self) -> Self {
+        if self.is_up() {
+            return self;
+        }
+        Self {
+            elevation_deg: (2.0 * MIN_DESCENT).asin().to_degrees(),
+            ..self
+        }
     }
 
     /// Unit vector towards the sun, x east, y north, z up.
@@ -78,28 +104,46 @@ fn julian_date(time_utc: &str) -> Result<JulianDate, SunError> {
         return Err(bad_time());
     };
     // a local time in a field that is named UTC is more likely a mistake than a wish
-    let utc = [None, Some(Offset::Z), Some(Offset::Custom { minutes: 0 })];
+    let utc = [
+        None,
+        Some(GivenOffset::Z),
+        Some(GivenOffset::Custom { minutes: 0 }),
+    ];
     if !utc.contains(&parsed.offset) {
         return Err(SunError::NotUtc {
             given: time_utc.to_owned(),
         });
     }
-    let (year, month) = (i32::from(date.year), u32::from(date.month));
     let seconds =
         f64::from(time.second.unwrap_or(0)) + 1e-9 * f64::from(time.nanosecond.unwrap_or(0));
-    delta_t::estimate_from_date(year, month)
-        .and_then(|delta_t_s| {
-            JulianDate::from_utc(
-                year,
-                month,
-                u32::from(date.day),
-                u32::from(time.hour),
-                u32::from(time.minute),
-                seconds,
-                delta_t_s,
-            )
-        })
-        .map_err(|_| bad_time())
+    let date = (i32::from(date.year), date.month.into(), date.day.into());
+    julian(date, (time.hour.into(), time.minute.into()), seconds).map_err(|_| bad_time())
+}
+
+fn julian(
+    (year, month, day): (i32, u32, u32),
+    (hour, minute): (u32, u32),
+    seconds: f64,
+) -> Result<JulianDate, solar_positioning::Error> {
+    let delta_t_s = delta_t::estimate_from_date(year, month)?;
+    JulianDate::from_utc(year, month, day, hour, minute, seconds, delta_t_s)
+}
+
+fn stands(
+    date: JulianDate,
+    latitude_deg: f64,
+    longitude_deg: f64,
+) -> Result<Sun, solar_positioning::Error> {
+    let location = Location {
+        latitude: latitude_deg,
+        longitude: longitude_deg,
+    };
+    let refraction = Some(RefractionCorrection::standard());
+    let position = SolarPositions::new().at_from_julian(date, location, 0.0, refraction)?;
+    Ok(Sun {
+        elevation_deg: position.elevation_angle(),
+        azimuth_deg: position.azimuth(),
+    })
 }
 
 /// Why there is no sun to be had.

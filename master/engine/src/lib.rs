@@ -27,6 +27,7 @@ pub mod progress;
 pub mod resident;
 pub mod rounds;
 pub mod run;
+pub mod series;
 mod sinks;
 pub mod solution;
 mod solve_error;

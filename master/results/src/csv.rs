@@ -28,6 +28,12 @@ pub(crate) fn write(table: &Table<'_>, out: &mut impl Write) -> Result<(), Fault
                     let value = column.finite(row, cell(row))?;
                     out.write_all(digits.format_finite(value).as_bytes())?;
                 }
+                Cells::Sparse(cell) => {
+                    if let Some(value) = cell(row) {
+                        let value = column.finite(row, value)?;
+                        out.write_all(digits.format_finite(value).as_bytes())?;
+                    }
+                }
             }
         }
         out.write_all(b"\n")?;

@@ -1,7 +1,7 @@
 //! Results as files to keep and pages to look at: tables, a surface for ParaView, a summary; the report of a result;
 //! the study of what speed costs in accuracy. What a solve says on the terminal is here too.
 //!
-//! A result is a folder: `organs`, `triangles` and (where there is a soil plane) `soil` as `.csv` or
+//! The result of a solve is a folder: `organs`, `triangles` and (where there is a soil plane) `soil` as `.csv` or
 //! `.parquet`, `canopy.vtp` if asked for, and `summary.json`, which is written last. All files are written beside
 //! their places and then renamed: see [`atomic`] for what that means to a reader of the folder.
 //!
@@ -23,6 +23,7 @@ mod json;
 mod number;
 mod parquet;
 pub mod report;
+pub mod series;
 pub mod summary;
 mod table;
 mod tables;

@@ -44,6 +44,14 @@ pub(crate) fn write(table: &Table<'_>, out: impl Write + Send) -> Result<(), Fau
                         .collect::<Result<_, _>>()?;
                     writer.write_batch(&reals, None, None)?;
                 }
+                (Cells::Sparse(cell), ColumnWriter::DoubleColumnWriter(writer)) => {
+                    let known = |row| cell(row).map(|value| column.finite(row, value));
+                    let levels: Vec<i16> =
+                        rows.clone().map(|row| cell(row).is_some().into()).collect();
+                    let reals: Vec<f64> =
+                        rows.clone().filter_map(known).collect::<Result<_, _>>()?;
+                    writer.write_batch(&reals, Some(&levels), None)?;
+                }
                 _ => return Err(one_writer_per_column().into()),
             }
             writer.close()?;
@@ -71,10 +79,14 @@ fn field(column: &Column<'_>) -> Result<TypePtr, ParquetError> {
     let (physical, logical) = match column.cells {
         Cells::Text(_) => (Physical::BYTE_ARRAY, Some(LogicalType::String)),
         Cells::Index(_) => (Physical::INT64, None),
-        Cells::Real(_) => (Physical::DOUBLE, None),
+        Cells::Real(_) | Cells::Sparse(_) => (Physical::DOUBLE, None),
+    };
+    let repetition = match column.cells {
+        Cells::Sparse(_) => Repetition::OPTIONAL,
+        _ => Repetition::REQUIRED,
     };
     let field = Type::primitive_type_builder(column.name, physical)
-        .with_repetition(Repetition::REQUIRED)
+        .with_repetition(repetition)
         .with_logical_type(logical)
         .build()?;
     Ok(Arc::new(field))
@@ -89,7 +101,9 @@ fn properties(table: &Table<'_>) -> WriterPropertiesPtr {
         properties = match column.cells {
             Cells::Text(_) => properties.set_column_dictionary_enabled(path, true),
             Cells::Index(_) => properties.set_column_encoding(path, Encoding::DELTA_BINARY_PACKED),
-            Cells::Real(_) => properties.set_column_encoding(path, Encoding::PLAIN),
+            Cells::Real(_) | Cells::Sparse(_) => {
+                properties.set_column_encoding(path, Encoding::PLAIN)
+            }
         };
     }
     Arc::new(properties.build())

@@ -26,6 +26,8 @@ pub(crate) enum Cells<'a> {
     Index(Rc<dyn Fn(usize) -> usize + 'a>),
     /// Rounded already, but perhaps not finite: read through [`Column::finite`].
     Real(Rc<dyn Fn(usize) -> f64 + 'a>),
+    /// The same, with empty cells.
+    Sparse(Rc<dyn Fn(usize) -> Option<f64> + 'a>),
 }
 
 impl<'a> Column<'a> {
@@ -42,6 +44,12 @@ impl<'a> Column<'a> {
     /// A quantity, written with nine significant digits.
     pub(crate) fn quantity(name: &'static str, cell: impl Fn(usize) -> f64 + 'a) -> Self {
         let cells = Cells::Real(Rc::new(move |row| round_to_nine_digits(cell(row))));
+        Self { name, cells }
+    }
+
+    /// A quantity that is not known in every row.
+    pub(crate) fn sparse(name: &'static str, cell: impl Fn(usize) -> Option<f64> + 'a) -> Self {
+        let cells = Cells::Sparse(Rc::new(move |row| cell(row).map(round_to_nine_digits)));
         Self { name, cells }
     }
 

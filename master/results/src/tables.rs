@@ -6,7 +6,7 @@ use nestrad_engine::solution::{Estimate, ItemLight, SoilMap, Solution};
 use crate::table::{Column, Table};
 
 /// The kind of an organ whose triangles are of several.
-const MIXED: &str = "mixed";
+pub(crate) const MIXED: &str = "mixed";
 
 /// One row per organ and band.
 pub(crate) fn organs<'a>(

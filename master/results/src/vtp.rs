@@ -122,6 +122,9 @@ fn values<'a>(cells: &Cells<'a>, count: usize, row: impl Fn(usize) -> usize + 'a
         Cells::Text(cell) => Values::Text(Box::new(move |i| cell(row(i)))),
         Cells::Index(cell) => Values::I64(Box::new(move |i| cell(row(i)) as i64)),
         Cells::Real(cell) => Values::F32(Box::new(move |i| cell(row(i)) as f32)),
+        Cells::Sparse(cell) => {
+            Values::F32(Box::new(move |i| cell(row(i)).unwrap_or_default() as f32))
+        }
     }
 }
 

@@ -21,6 +21,7 @@ use rayon::ThreadPoolBuildError;
 use thiserror::Error;
 
 use super::console::note;
+use super::series::SeriesMemory;
 
 /// How a command ends; README.md and docs/operators.md say the same.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -147,6 +148,9 @@ fn of_one(error: &(dyn Error + 'static)) -> Option<Exit> {
     }
     if error.is::<Stopped>() {
         return Some(Exit::Cancelled);
+    }
+    if error.is::<SeriesMemory>() {
+        return Some(Exit::Limit);
     }
     let no_threads = error.is::<ThreadPoolBuildError>()
         || matches!(

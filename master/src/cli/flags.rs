@@ -17,6 +17,17 @@ use super::numbers::number;
 #[derive(Debug, Args)]
 #[command(next_help_heading = "What to compute")]
 pub(crate) struct SceneFlags {
+    #[command(flatten)]
+    canopy: CanopyFlags,
+
+    #[command(flatten)]
+    light: LightFlags,
+}
+
+/// The canopy and its optics. What is said here wins over what a scene file says.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What to compute")]
+pub(crate) struct CanopyFlags {
     /// The canopy: CAN or OBJ files (.can, .obj, plain or .gz), or a scene file (.toml)
     ///
     /// A scene file can hold all that flags can say; a flag replaces what the file says. Geometry files given
@@ -30,6 +41,28 @@ pub(crate) struct SceneFlags {
     #[arg(long, value_name = "NAME=FILE", value_parser = named_file)]
     optics: Vec<(String, PathBuf)>,
 
+    /// The rectangle on which the canopy repeats without end, a .8 file [default: the canopy stands alone]
+    #[arg(long, value_name = "FILE")]
+    pattern: Option<PathBuf>,
+
+    /// Height of a horizontal soil plane, in --unit [default: no soil plane, light escapes downwards]
+    #[arg(long, value_name = "Z", value_parser = number, allow_negative_numbers = true)]
+    soil: Option<f64>,
+
+    /// Unit of length of geometry, pattern and --soil: m, cm or mm; results are in m [default: m]
+    #[arg(long)]
+    unit: Option<Unit>,
+
+    /// The axis of the geometry files that points up: y or z. With y, the x of a file stays, its y becomes z
+    /// and its z becomes -y; in pattern, --soil and light z always points up [default: z]
+    #[arg(long, value_name = "AXIS")]
+    up: Option<Up>,
+}
+
+/// The light, in files or as a built-in sky.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "What to compute")]
+struct LightFlags {
     /// Sources of light: one .light file for all bands, or one file for each band (NAME=FILE)
     ///
     /// Each line of the file is a parallel source: irradiance on a horizontal surface (W m-2) and direction of
@@ -92,23 +125,6 @@ pub(crate) struct SceneFlags {
         allow_negative_numbers = true
     )]
     diffuse_fraction: Option<f64>,
-
-    /// The rectangle on which the canopy repeats without end, a .8 file [default: the canopy stands alone]
-    #[arg(long, value_name = "FILE")]
-    pattern: Option<PathBuf>,
-
-    /// Height of a horizontal soil plane, in --unit [default: no soil plane, light escapes downwards]
-    #[arg(long, value_name = "Z", value_parser = number, allow_negative_numbers = true)]
-    soil: Option<f64>,
-
-    /// Unit of length of geometry, pattern and --soil: m, cm or mm; results are in m [default: m]
-    #[arg(long)]
-    unit: Option<Unit>,
-
-    /// The axis of the geometry files that points up: y or z. With y, the x of a file stays, its y becomes z
-    /// and its z becomes -y; in pattern, --soil and light z always points up [default: z]
-    #[arg(long, value_name = "AXIS")]
-    up: Option<Up>,
 }
 
 /// A built-in sky.
@@ -127,6 +143,19 @@ enum SkyKind {
 impl SceneFlags {
     /// Flags over the scene file, if there is one.
     pub(crate) fn inputs(self, options: Options) -> Result<Inputs> {
+        let light = self.light.light()?;
+        self.canopy.inputs(light, BTreeMap::new(), options)
+    }
+}
+
+impl CanopyFlags {
+    /// Flags over the scene file, if there is one, with a light and parts of weather that are given elsewhere.
+    pub(crate) fn inputs(
+        &self,
+        light: Option<LightInput>,
+        band_fraction: BTreeMap<String, f64>,
+        options: Options,
+    ) -> Result<Inputs> {
         let is_toml = |path: &PathBuf| assemble::is_scene_file(path);
         let (files, scenes): (Vec<_>, Vec<_>) = self.scenes.iter().cloned().partition(is_toml);
         let file = match &files[..] {
@@ -148,12 +177,15 @@ impl SceneFlags {
             // said in a scene file alone
             kinds: KindsInput::default(),
             bands: bands.collect(),
-            light: self.light()?,
+            light,
+            band_fraction,
             options,
         };
         Ok(flags.over(file))
     }
+}
 
+impl LightFlags {
     fn light(self) -> Result<Option<LightInput>> {
         if let Some(kind) = self.sky {
             let irradiance_W_m2 = once("--irradiance", self.irradiance.clone())?;
@@ -204,12 +236,12 @@ impl SceneFlags {
 }
 
 /// A call that makes no sense, found after parsing.
-fn misuse(message: &str) -> anyhow::Error {
+pub(super) fn misuse(message: &str) -> anyhow::Error {
     clap::Error::raw(ErrorKind::ArgumentConflict, format!("{message}\n")).into()
 }
 
 /// Values by name; a name that comes twice is an error.
-fn once<T>(flag: &str, named: Vec<(String, T)>) -> Result<BTreeMap<String, T>> {
+pub(super) fn once<T>(flag: &str, named: Vec<(String, T)>) -> Result<BTreeMap<String, T>> {
     let mut values = BTreeMap::new();
     for (name, value) in named {
         if values.contains_key(&name) {
@@ -238,7 +270,7 @@ fn light_file(text: &str) -> Result<(Option<String>, PathBuf), String> {
     }
 }
 
-fn named_number(text: &str) -> Result<(String, f64), String> {
+pub(super) fn named_number(text: &str) -> Result<(String, f64), String> {
     let (name, number) = named(text).ok_or("expected NAME=NUMBER")?;
     match number.parse() {
         Ok(number) => Ok((name, number)),

@@ -10,6 +10,7 @@ mod numbers;
 mod record;
 mod remote;
 mod report;
+mod series;
 mod serve;
 mod settings;
 mod solve;
@@ -40,6 +41,8 @@ pub(crate) enum Command {
     Check(check::CheckArgs),
     Generate(generate::GenerateArgs),
     Report(report::ReportArgs),
+    Series(Box<series::SeriesArgs>),
+    Day(Box<series::DayArgs>),
     Serve(serve::ServeArgs),
     Status(status::StatusArgs),
     Trade(Box<trade::TradeArgs>),

@@ -91,7 +91,7 @@ impl OptionsRecord {
 }
 
 /// Where a file is, from wherever one looks.
-fn absolute(path: &Path) -> String {
+pub(super) fn absolute(path: &Path) -> String {
     // the current folder may be gone: what the user said is all that there is then
     let whole = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());
     whole.display().to_string()

@@ -15,6 +15,7 @@ use super::tables::{
 };
 use crate::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
 use crate::light::Sky;
+use crate::light::photons::flat_spectrum_umol_J;
 use crate::optics::{AN_ALBEDO, FaceOptics, LeafOptics, is_albedo};
 
 /// Paths become relative to what `folder` is relative to.
@@ -41,7 +42,10 @@ pub(super) fn inputs(
     let kinds = file.kinds.map(|given| kinds(given, text));
     let bands = file.bands.into_iter();
     let bands = bands.map(|given| band(given, text, folder));
-    let light = file.light.map(|given| light(given, text, folder));
+    let (light, band_fraction) = match file.light {
+        Some(given) => light(given, text, folder)?,
+        None => (None, BTreeMap::new()),
+    };
     Ok(Inputs {
         scenes,
         unit: file.unit,
@@ -50,7 +54,8 @@ pub(super) fn inputs(
         soil: file.soil.map(Spanned::into_inner),
         kinds: kinds.transpose()?.unwrap_or_default(),
         bands: bands.collect::<Result<_, _>>()?,
-        light: light.transpose()?,
+        light,
+        band_fraction,
         options: file.options.map(Spanned::into_inner).unwrap_or_default(),
     })
 }
@@ -104,6 +109,7 @@ fn band(
             return Err(text.fault(&albedo.span(), AN_ALBEDO, albedo.as_ref()));
         }
     }
+    let photon_umol_J = photons(band.photon_umol_J, band.wavelengths_nm, text)?;
     let mut materials = BTreeMap::new();
     for (name, given) in band.materials {
         materials.insert(name, material(&given, text)?);
@@ -113,9 +119,49 @@ fn band(
         optics: band.optics.map(|path| folder.join(path)),
         soil_albedo: band.soil_albedo.map(Spanned::into_inner),
         materials,
+        photon_umol_J,
         place: Some(place),
     })
 }
+
+/// Photons of a joule, given or by wavelengths.
+fn photons(
+    factor: Option<Spanned<f64>>,
+    wavelengths: Option<Spanned<[f64; 2]>>,
+    text: &Text<'_>,
+) -> Result<Option<f64>, FormatError> {
+    match (factor, wavelengths) {
+        (None, None) => Ok(None),
+        (Some(factor), Some(_)) => {
+            let expected = "either photon_umol_J or wavelengths_nm";
+            Err(text.fault(&factor.span(), expected, "both"))
+        }
+        (Some(factor), None) => {
+            let found = *factor.as_ref();
+            if !(found > 0.0 && found <= MOST_UMOL_J) {
+                let expected = "photons of a joule, above 0 to 1000 umol (4.57 is usual for PAR)";
+                return Err(text.fault(&factor.span(), expected, found));
+            }
+            Ok(Some(found))
+        }
+        (None, Some(wavelengths)) => {
+            let [from, to] = *wavelengths.as_ref();
+            if !(from > 0.0 && from < to && to <= MOST_NM) {
+                let expected =
+                    "wavelengths in nm, from the shorter to the longer, above 0 to 100000";
+                let found = format!("[{from}, {to}]");
+                return Err(text.fault(&wavelengths.span(), expected, found));
+            }
+            Ok(Some(flat_spectrum_umol_J([from, to])))
+        }
+    }
+}
+
+/// Photons of a joule, µmol, at 120 µm: more is a mistake.
+const MOST_UMOL_J: f64 = 1000.0;
+
+/// The longest wavelength that is taken, nm: more is a mistake.
+const MOST_NM: f64 = 100_000.0;
 
 fn material(given: &Spanned<MaterialTable>, text: &Text<'_>) -> Result<LeafOptics, FormatError> {
     let face = |face: FaceTable| FaceOptics {
@@ -151,36 +197,50 @@ fn material(given: &Spanned<MaterialTable>, text: &Text<'_>) -> Result<LeafOptic
     Ok(optics)
 }
 
+/// The light, if there is one, and the parts that bands have of weather.
+type GivenLight = (Option<LightInput>, BTreeMap<String, f64>);
+
 fn light(
     given: Spanned<LightText>,
     text: &Text<'_>,
     folder: &Path,
-) -> Result<LightInput, FormatError> {
+) -> Result<GivenLight, FormatError> {
     let span = given.span();
-    let light = match given.into_inner() {
-        LightText::File(path) => LightInput::File(folder.join(path)),
-        LightText::Table(LightTable {
-            files: Some(files),
-            sky: None,
-        }) => {
-            let files = files.into_iter();
-            LightInput::Files(
-                files
-                    .map(|(band, path)| (band, folder.join(path)))
-                    .collect(),
-            )
+    let LightTable {
+        files,
+        sky,
+        band_fraction,
+    } = match given.into_inner() {
+        LightText::File(path) => {
+            let light = LightInput::File(folder.join(path));
+            return Ok((Some(light), BTreeMap::new()));
         }
-        LightText::Table(LightTable {
-            files: None,
-            sky: Some(given),
-        }) => sky(given, &span, text)?,
-        LightText::Table(_) => {
+        LightText::Table(table) => table,
+    };
+    let refused = band_fraction
+        .iter()
+        .find(|(_, part)| !(**part > 0.0 && **part <= 1.0));
+    if let Some((band, part)) = refused {
+        let expected = format!("a part above 0 to 1 as band_fraction of {band}");
+        return Err(text.fault(&span, expected, part));
+    }
+    let light = match (files, sky) {
+        (Some(files), None) => {
+            let files = files.into_iter();
+            let files = files.map(|(band, path)| (band, folder.join(path)));
+            Some(LightInput::Files(files.collect()))
+        }
+        (None, Some(given)) => Some(self::sky(given, &span, text)?),
+        (None, None) if !band_fraction.is_empty() => None,
+        _ => {
             let expected = "either [light.files] or [light.sky]";
             return Err(text.fault(&span, expected, "both or none"));
         }
     };
-    light.check().map_err(|fault| text.message(&span, fault))?;
-    Ok(light)
+    if let Some(light) = &light {
+        light.check().map_err(|fault| text.message(&span, fault))?;
+    }
+    Ok((light, band_fraction))
 }
 
 fn sky(given: SkyTable, span: &Range<usize>, text: &Text<'_>) -> Result<LightInput, FormatError> {

@@ -11,6 +11,7 @@
 //! [[bands]]
 //! name = "PAR"
 //! optics = "par.opt"
+//! photon_umol_J = 4.57                # or wavelengths_nm = [400, 700]: tables have photons too
 //!
 //! [[bands]]
 //! name = "NIR"
@@ -30,7 +31,8 @@
 //! In place of `light = "FILE"`: `[light.files]`, with one `.light` file for each band's name, or
 //! `[light.sky]` with `kind = "uniform_overcast"`, `"standard_overcast"` or `"clear"`,
 //! `irradiance_W_m2 = { PAR = 400.0, NIR = 380.0 }`, and for a clear sky `time_utc`, `latitude_deg`,
-//! `longitude_deg`, `diffuse_fraction`. Paths are relative to the scene file.
+//! `longitude_deg`, `diffuse_fraction`. For weather (`nestrad series`, `nestrad day`) `[light.band_fraction]` says which
+//! part of broadband irradiance a band gets: `PAR = 0.48`. Paths are relative to the scene file.
 
 mod checks;
 mod hints;

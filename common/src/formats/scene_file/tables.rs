@@ -58,6 +58,8 @@ pub(super) struct BandTable {
     pub(super) name: String,
     pub(super) optics: Option<PathBuf>,
     pub(super) soil_albedo: Option<Spanned<f64>>,
+    pub(super) photon_umol_J: Option<Spanned<f64>>,
+    pub(super) wavelengths_nm: Option<Spanned<[f64; 2]>>,
     #[serde(default)]
     pub(super) materials: BTreeMap<String, Spanned<MaterialTable>>,
 }
@@ -114,6 +116,8 @@ impl<'de> Deserialize<'de> for LightText {
 pub(super) struct LightTable {
     pub(super) files: Option<BTreeMap<String, PathBuf>>,
     pub(super) sky: Option<SkyTable>,
+    #[serde(default)]
+    pub(super) band_fraction: BTreeMap<String, f64>,
 }
 
 #[derive(Deserialize)]

@@ -21,14 +21,14 @@ pub struct Formats {
     pub vtp: bool,
 }
 
-const SUMMARY: &str = "summary.json";
+pub(crate) const SUMMARY: &str = "summary.json";
 const SURFACE: &str = "canopy.vtp";
 /// The page that is made of a result.
 pub(crate) const REPORT: &str = "report.html";
 
-/// All that a run may write: what is not part of a result is removed from an earlier one's folder,
+/// All that a run may write, of a solve or a series: what is not part of a result is removed from an earlier one's folder,
 /// so that a folder never shows two results at once.
-const ALL_FILES: [&str; 9] = [
+pub(crate) const ALL_FILES: [&str; 19] = [
     "organs.csv",
     "organs.parquet",
     "triangles.csv",
@@ -36,6 +36,17 @@ const ALL_FILES: [&str; 9] = [
     "soil.csv",
     "soil.parquet",
     SURFACE,
+    // of a series
+    "series.csv",
+    "series.parquet",
+    "balance.csv",
+    "balance.parquet",
+    "integrals.csv",
+    "integrals.parquet",
+    "plants.csv",
+    "plants.parquet",
+    "species.csv",
+    "species.parquet",
     // made of a result by `nestrad report`: it does not outlive it
     REPORT,
     SUMMARY,
@@ -100,7 +111,7 @@ pub fn write_all(
     stage(dir, canopy, band_names, solution, formats)?.commit(summary)
 }
 
-fn write_table(
+pub(crate) fn write_table(
     staging: &mut Staging,
     table: &Table<'_>,
     format: TableFormat,

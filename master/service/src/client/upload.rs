@@ -1,8 +1,9 @@
 //! A scene as the slices that a master takes.
 
+use glam::DVec3;
 use nestrad_common::canopy::{Canopy, Kind};
 use nestrad_common::light::SkyLight;
-use nestrad_common::light::sky::Radiance;
+use nestrad_common::light::{CieType, Radiance};
 use nestrad_common::scene::Scene;
 use nestrad_proto::{SLICE_BYTES, v1};
 use v1::scene_header::Geometry;
@@ -74,17 +75,28 @@ fn sky(light: &SkyLight) -> v1::SkyLight {
         radiance: Some(match light.radiance {
             Radiance::Uniform => Sent::Uniform(v1::UniformSky {}),
             Radiance::MoonSpencer => Sent::MoonSpencer(v1::MoonSpencerSky {}),
-            Radiance::CieClear { towards_sun } => Sent::CieClear(v1::CieClearSky {
-                towards_sun: Some(v1::Vector {
-                    x: towards_sun.x,
-                    y: towards_sun.y,
-                    z: towards_sun.z,
-                }),
+            Radiance::Cie { kind, towards_sun } if kind == CieType::CLEAR => {
+                Sent::CieClear(v1::CieClearSky {
+                    towards_sun: Some(vector(towards_sun)),
+                })
+            }
+            Radiance::Cie { kind, towards_sun } => Sent::Cie(v1::CieSky {
+                r#type: kind.number().into(),
+                towards_sun: Some(vector(towards_sun)),
+            }),
+            Radiance::Perez(perez) => Sent::Perez(v1::PerezSky {
+                towards_sun: Some(vector(perez.towards_sun)),
+                clearness: perez.clearness,
+                brightness: perez.brightness,
             }),
         }),
         irradiance_w_m2: light.irradiance_W_m2.clone(),
         diffuse_fraction: light.diffuse_fraction,
     }
+}
+
+fn vector(DVec3 { x, y, z }: DVec3) -> v1::Vector {
+    v1::Vector { x, y, z }
 }
 
 /// The canopy stands at its local origin already: the master leaves it there, bit for bit.

@@ -5,7 +5,7 @@ use std::fmt;
 use glam::DVec3;
 use nestrad_common::canopy::Organ;
 use nestrad_common::light::Light;
-use nestrad_common::light::sky::Radiance;
+use nestrad_common::light::Radiance;
 use nestrad_common::optics::Optics;
 use nestrad_proto::v1;
 
@@ -114,12 +114,15 @@ pub(super) fn scene_id(geometry: Id, optics: &Optics, light: &Light) -> Id {
     }
     words.count(usize::from(light.sky.is_some()));
     if let Some(sky) = &light.sky {
-        let (kind, towards_sun) = match sky.radiance {
-            Radiance::Uniform => (0, DVec3::ZERO),
-            Radiance::MoonSpencer => (1, DVec3::ZERO),
-            Radiance::CieClear { towards_sun } => (2, towards_sun),
+        let (kind, shape) = match sky.radiance {
+            Radiance::Uniform => (0, [0.0; 2]),
+            Radiance::MoonSpencer => (1, [0.0; 2]),
+            Radiance::Cie { kind, .. } => (2, [kind.number().into(), 0.0]),
+            Radiance::Perez(perez) => (3, [perez.clearness, perez.brightness]),
         };
         words.count(kind);
+        words.numbers(&shape);
+        let towards_sun = sky.radiance.towards_sun().unwrap_or_default();
         words.numbers(&towards_sun.to_array());
         words.numbers(&[sky.diffuse_fraction]);
         words.numbers(&sky.irradiance_W_m2);

@@ -7,7 +7,8 @@ use std::sync::Arc;
 use glam::DVec3;
 use nestrad_common::canopy::{Kind, MAX_NAME_BYTES};
 use nestrad_common::formats::pattern::{MIN_SIDE, Rectangle};
-use nestrad_common::light::sky::Radiance;
+use nestrad_common::light::perez::Perez;
+use nestrad_common::light::radiance::{CIE_TYPES, CieType, Radiance};
 use nestrad_common::light::{
     AN_IRRADIANCE, Light, MIN_DESCENT, POINTS_DOWN, SkyLight, Source, is_irradiance,
 };
@@ -112,25 +113,45 @@ fn band(b: usize, given: &v1::BandOptics, surfaces: &[Surface]) -> Result<Band, 
     })
 }
 
+/// Where a sky has its sun.
+fn towards_sun(place: &'static str, given: Option<v1::Vector>) -> Result<DVec3, ServiceError> {
+    let v1::Vector { x, y, z } = given.unwrap_or_default();
+    let towards_sun = unit(DVec3::new(x, y, z));
+    if !towards_sun.is_finite() || towards_sun.z < MIN_DESCENT {
+        return Err(ServiceError::invalid(
+            place,
+            "a direction that points up, 0.0057 degrees above the horizon or more",
+            format_args!("{x} {y} {z}"),
+        ));
+    }
+    Ok(towards_sun)
+}
+
 fn sky(given: &v1::SkyLight, bands: usize) -> Result<SkyLight, ServiceError> {
     use v1::sky_light::Radiance as Given;
     let radiance = match &given.radiance {
         Some(Given::Uniform(_)) => Radiance::Uniform,
         Some(Given::MoonSpencer(_)) => Radiance::MoonSpencer,
-        Some(Given::CieClear(clear)) => {
-            let v1::Vector { x, y, z } = clear.towards_sun.unwrap_or_default();
-            let towards_sun = unit(DVec3::new(x, y, z));
-            if !towards_sun.is_finite() || towards_sun.z < MIN_DESCENT {
-                return Err(ServiceError::invalid(
-                    "sky.cie_clear.towards_sun",
-                    "a direction that points up, 0.0057 degrees above the horizon or more",
-                    format_args!("{x} {y} {z}"),
-                ));
+        Some(Given::CieClear(clear)) => Radiance::Cie {
+            kind: CieType::CLEAR,
+            towards_sun: towards_sun("sky.cie_clear.towards_sun", clear.towards_sun)?,
+        },
+        Some(Given::Cie(cie)) => {
+            let kind = u8::try_from(cie.r#type).ok().and_then(CieType::new);
+            let invalid = || ServiceError::invalid("sky.cie.type", CIE_TYPES, cie.r#type);
+            Radiance::Cie {
+                kind: kind.ok_or_else(invalid)?,
+                towards_sun: towards_sun("sky.cie.towards_sun", cie.towards_sun)?,
             }
-            Radiance::CieClear { towards_sun }
         }
+        // the ranges of the model are checked with the whole light
+        Some(Given::Perez(perez)) => Radiance::Perez(Perez {
+            towards_sun: towards_sun("sky.perez.towards_sun", perez.towards_sun)?,
+            clearness: perez.clearness,
+            brightness: perez.brightness,
+        }),
         None => {
-            let wanted = "uniform, moon_spencer or cie_clear";
+            let wanted = "uniform, moon_spencer, cie_clear, cie or perez";
             return Err(ServiceError::invalid("sky.radiance", wanted, "none"));
         }
     };

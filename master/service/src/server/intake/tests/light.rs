@@ -159,7 +159,10 @@ fn skies_that_cannot_be_are_refused() {
     let radiance = taken.sky.as_ref().unwrap().radiance;
     assert_eq!(
         radiance,
-        nestrad_common::light::sky::Radiance::CieClear { towards_sun }
+        nestrad_common::light::Radiance::Cie {
+            kind: nestrad_common::light::CieType::CLEAR,
+            towards_sun
+        }
     );
     for (result, said) in [
         (

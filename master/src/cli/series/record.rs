@@ -1,0 +1,77 @@
+//! The options of a series as its summary keeps them, defaults included.
+
+use nestrad_common::inputs::{Inputs, PatternInput};
+use nestrad_common::options::{Diameter, TableFormat, Unit, Up};
+use serde::Serialize;
+
+use super::task::{Source, Task};
+use crate::cli::record::absolute;
+
+#[derive(Debug, Serialize)]
+pub(super) struct SeriesRecord<'a> {
+    scenes: Vec<String>,
+    unit: Unit,
+    up: Up,
+    pattern: Option<String>,
+    /// In `unit`.
+    soil: Option<f64>,
+    bands: Vec<BandRecord<'a>>,
+    weather: &'a Source,
+    sky: String,
+    latitude_deg: f64,
+    longitude_deg: f64,
+    diameter: Diameter,
+    accuracy_percent: f64,
+    memory_GiB: f64,
+    threads: usize,
+    seed: u64,
+    format: TableFormat,
+}
+
+#[derive(Debug, Serialize)]
+struct BandRecord<'a> {
+    name: &'a str,
+    optics: Option<String>,
+    /// Of broadband irradiance, where the weather has no columns of the band.
+    band_fraction: Option<f64>,
+    photon_umol_J: Option<f64>,
+}
+
+impl<'a> SeriesRecord<'a> {
+    /// To be called where the work is done: it counts the threads there.
+    pub(super) fn of(task: &'a Task) -> Self {
+        let Inputs { options, .. } = &task.inputs;
+        let bands = task.inputs.bands.iter().map(|band| BandRecord {
+            name: &band.name,
+            optics: band.optics.as_deref().map(absolute),
+            band_fraction: task.inputs.band_fraction.get(&band.name).copied(),
+            photon_umol_J: band.photon_umol_J,
+        });
+        Self {
+            scenes: task
+                .inputs
+                .scenes
+                .iter()
+                .map(|path| absolute(path))
+                .collect(),
+            unit: task.inputs.unit.unwrap_or_default(),
+            up: task.inputs.up.unwrap_or_default(),
+            pattern: task.inputs.pattern.as_ref().map(|pattern| match pattern {
+                PatternInput::File(path) => absolute(path),
+                PatternInput::Corners(corners) => corners.map(|c| (c + 0.0).to_string()).join(" "),
+            }),
+            soil: task.inputs.soil,
+            bands: bands.collect(),
+            weather: &task.source,
+            sky: task.sky.to_string(),
+            latitude_deg: task.place.latitude_deg,
+            longitude_deg: task.place.longitude_deg,
+            diameter: task.settings.diameter,
+            accuracy_percent: task.settings.accuracy_percent,
+            memory_GiB: task.settings.memory_GiB,
+            threads: rayon::current_num_threads(),
+            seed: task.settings.seed,
+            format: options.format.unwrap_or_default(),
+        }
+    }
+}
