@@ -12,4 +12,5 @@ mod kinds;
 mod minus_zero;
 mod refusals;
 mod results;
+mod series;
 mod trades;
