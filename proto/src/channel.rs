@@ -23,7 +23,7 @@ const CONNECT: Duration = Duration::from_secs(10);
 pub(crate) const KEEP_ALIVE: Duration = Duration::from_secs(20);
 
 /// Bytes that may be on the way in one stream, and in one connection.
-pub(crate) const STREAM_WINDOW: u32 = 2 << 20;
+pub const STREAM_WINDOW: u32 = 2 << 20;
 pub(crate) const CONNECTION_WINDOW: u32 = 8 << 20;
 
 /// Who the caller is, and how the master is recognised.

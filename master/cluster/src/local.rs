@@ -46,6 +46,9 @@ pub enum LocalError {
         /// What the system says.
         source: io::Error,
     },
+    /// There is no thread to look after them.
+    #[error("cannot start a thread for the worker processes")]
+    Thread(#[source] io::Error),
     /// This program's place is not known.
     #[error("cannot find nestrad-worker")]
     Place(#[source] io::Error),
@@ -57,36 +60,41 @@ impl LocalWorkers {
         let program = env::current_exe()
             .map_err(LocalError::Place)?
             .with_file_name("nestrad-worker");
-        let mut children = Vec::new();
+        Self::start_program(program, door, share, thread::Builder::new())
+    }
+
+    /// ... on a thread that looks after them.
+    fn start_program(
+        program: PathBuf,
+        door: &Door,
+        share: Share,
+        watcher: thread::Builder,
+    ) -> Result<Self, LocalError> {
+        // dropped, they end: also where no thread can be had
+        let mut children = Children(Vec::new());
         for k in 0..share.workers {
             let started = command(&program, door, share, k).spawn();
             match started {
-                Ok(child) => children.push(child),
-                Err(source) => {
-                    stop(children, Duration::ZERO);
-                    return Err(LocalError::Start { program, source });
-                }
+                Ok(child) => children.0.push(child),
+                Err(source) => return Err(LocalError::Start { program, source }),
             }
         }
         let (end, ended) = mpsc::channel();
         let cluster = door.cluster().clone();
-        let watching = thread::spawn(move || {
+        let watching = watcher.spawn(move || {
             let mut told = false;
             while let Err(RecvTimeoutError::Timeout) = ended.recv_timeout(PAUSE) {
-                let lives = children
-                    .iter_mut()
-                    .any(|child| matches!(child.try_wait(), Ok(None)));
-                if !lives && !told {
+                if !children.any_lives() && !told {
                     told = true;
-                    let n = children.len();
+                    let n = children.0.len();
                     cluster.desert(&format!("all {n} worker processes have ended"));
                 }
             }
-            stop(children, FAREWELL);
+            children.end(FAREWELL);
         });
         Ok(Self {
             end: Some(end),
-            watching: Some(watching),
+            watching: Some(watching.map_err(LocalError::Thread)?),
         })
     }
 }
@@ -123,22 +131,61 @@ fn command(program: &PathBuf, door: &Door, share: Share, k: u32) -> Command {
     command
 }
 
-/// Ends processes: those that do not end in time by themselves are killed.
-fn stop(mut children: Vec<Child>, patience: Duration) {
-    let begun = Instant::now();
-    for child in &mut children {
-        drop(child.stdin.take());
+/// Processes that end with this.
+struct Children(Vec<Child>);
+
+impl Children {
+    fn any_lives(&mut self) -> bool {
+        self.0
+            .iter_mut()
+            .any(|child| matches!(child.try_wait(), Ok(None)))
     }
-    loop {
-        children.retain_mut(|child| matches!(child.try_wait(), Ok(None)));
-        if children.is_empty() || begun.elapsed() >= patience {
-            break;
+
+    /// Ends all: those that do not end in time by themselves are killed.
+    fn end(&mut self, patience: Duration) {
+        let begun = Instant::now();
+        for child in &mut self.0 {
+            drop(child.stdin.take());
         }
-        thread::sleep(PAUSE / 5);
+        while self.any_lives() && begun.elapsed() < patience {
+            thread::sleep(PAUSE / 5);
+        }
+        for mut child in self.0.drain(..) {
+            // it may have ended by itself
+            let _ = child.kill();
+            let _ = child.wait();
+        }
     }
-    for child in &mut children {
-        // it may have ended just now
-        let _ = child.kill();
-        let _ = child.wait();
+}
+
+impl Drop for Children {
+    fn drop(&mut self) {
+        self.end(Duration::ZERO);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::net::{Ipv4Addr, SocketAddr};
+
+    use nestrad_proto::access::Access;
+
+    use super::*;
+    use crate::cluster::WorkerLimits;
+
+    #[test]
+    fn a_thread_that_cannot_be_had_is_an_error() {
+        let here = SocketAddr::from((Ipv4Addr::LOCALHOST, 0));
+        let (access, limits) = (Access::default(), WorkerLimits::default());
+        let door = Door::open(here, &access, limits, 1).expect("a door of this machine");
+        let share = Share {
+            workers: 2,
+            threads: 2,
+            memory_GiB: 1.0,
+        };
+        // no machine has so much memory
+        let watcher = thread::Builder::new().stack_size(1 << 60);
+        let started = LocalWorkers::start_program("true".into(), &door, share, watcher);
+        assert!(matches!(started, Err(LocalError::Thread(_))));
     }
 }

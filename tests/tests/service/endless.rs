@@ -1,4 +1,7 @@
-//! A master that is not quite one: it tells of a solve again and again, and nothing new.
+//! Masters that are not quite ones: one tells of a solve again and again, and nothing new; one never takes a scene.
+
+use std::process::Output;
+use std::time::Instant;
 
 use nestrad_proto::access::Access;
 use nestrad_proto::connections::Connections;
@@ -11,18 +14,25 @@ use tokio::net::TcpListener;
 use tokio_stream::{Iter, iter};
 use tonic::{Request, Response, Status, Streaming};
 
-struct Endless;
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum NotQuite {
+    Endless,
+    Mute,
+}
 
 type Answer<T> = Result<Response<T>, Status>;
 
 #[tonic::async_trait]
-impl SolveService for Endless {
+impl SolveService for NotQuite {
     async fn upload_scene(
         &self,
         request: Request<Streaming<v1::SceneSlice>>,
     ) -> Answer<v1::UploadSceneResponse> {
         let mut slices = request.into_inner();
         while slices.message().await?.is_some() {}
+        if *self == Self::Mute {
+            std::future::pending::<()>().await;
+        }
         Ok(Response::new(v1::UploadSceneResponse::default()))
     }
 
@@ -77,22 +87,27 @@ impl SolveService for Endless {
     }
 }
 
-#[test]
-fn a_client_that_is_told_nothing_new_gives_up() {
+/// How a client ends that solves there.
+fn solved_at(master: NotQuite) -> Output {
     let desk = Desk::new();
-    let output = block_on(async {
+    block_on(async {
         let listener = TcpListener::bind("127.0.0.1:0").await.unwrap();
         let address = listener.local_addr().unwrap();
         let (url, connections) = (format!("http://{address}"), Connections::default());
         let mut server = Access::default().server(address, &connections).unwrap();
-        let master = server.add_service(SolveServiceServer::new(Endless));
+        let master = server.add_service(SolveServiceServer::new(master));
         let serving = tokio::spawn(master.serve_with_incoming(connections.incoming(listener)));
         let args = ["solve", "scene.toml", "--out", "out", "--master", &url];
         let client = nestrad(desk.folder(), &args).spawn().unwrap();
         let ended = tokio::task::spawn_blocking(|| wait_for(client)).await;
         serving.abort();
         ended.unwrap()
-    });
+    })
+}
+
+#[test]
+fn a_client_that_is_told_nothing_new_gives_up() {
+    let output = solved_at(NotQuite::Endless);
     let said = said(&output);
     assert!(!output.status.success());
     assert!(
@@ -103,4 +118,18 @@ fn a_client_that_is_told_nothing_new_gives_up() {
         said.contains("a plan \\u{1b}[2J") && !said.contains('\u{1b}'),
         "{said}"
     );
+}
+
+#[test]
+fn a_client_whose_scene_gets_no_answer_gives_up() {
+    let begun = Instant::now();
+    let output = solved_at(NotQuite::Mute);
+    let (said, took) = (said(&output), begun.elapsed());
+    assert_eq!(output.status.code(), Some(5), "{said}");
+    assert!(
+        said.contains("the master cannot be reached: no answer"),
+        "{said}"
+    );
+    // a minute after this small scene was sent
+    assert!((55..100).contains(&took.as_secs()), "{took:?}");
 }

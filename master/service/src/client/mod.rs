@@ -6,7 +6,9 @@
 //! the scene or the solve is asked again when it says, for a longer time.
 
 mod error;
+mod on_the_way;
 mod results;
+mod setback;
 mod solved;
 mod upload;
 
@@ -19,12 +21,14 @@ use nestrad_engine::progress::StageProgress;
 use nestrad_engine::traced::FailureKind;
 use nestrad_proto::channel::Authorized;
 use nestrad_proto::v1::solve_service_client::SolveServiceClient;
-use nestrad_proto::{MAX_MESSAGE_BYTES, RETRY_AFTER, reason, v1};
+use nestrad_proto::{MAX_MESSAGE_BYTES, reason, v1};
 use tokio::time::{sleep, timeout};
 use tonic::{Code, Status};
 
 pub use error::{RefusalKind, RemoteError};
+use on_the_way::OnTheWay;
 use results::Arriving;
+use setback::{Setback, retry_after};
 pub use solved::SolvedThere;
 
 /// A master that was never reached is given up after this.
@@ -156,28 +160,6 @@ struct Session {
     short: u32,
 }
 
-/// Why a try came to nothing.
-enum Setback {
-    /// The master is away: try again.
-    Away(Status),
-    /// The master does not know what it was asked for: tell it again.
-    Forgotten(Status),
-    /// The master has no room: ask again after a while.
-    Busy {
-        doing: &'static str,
-        status: Status,
-        wait: Duration,
-    },
-    /// Trying again is of no use.
-    Final(RemoteError),
-}
-
-impl From<RemoteError> for Setback {
-    fn from(error: RemoteError) -> Self {
-        Self::Final(error)
-    }
-}
-
 impl Session {
     async fn solve(&mut self, tell: &mut impl FnMut(Event)) -> Result<SolvedThere, RemoteError> {
         let begun = Instant::now();
@@ -277,25 +259,27 @@ impl Session {
     }
 
     async fn upload(&mut self) -> Result<String, Setback> {
-        let response = match &self.geometry_id {
+        let way = OnTheWay::begin();
+        let answer = match &self.geometry_id {
             Some(id) => {
                 let slice = upload::known(&self.scene, id);
-                self.master.upload_scene(tokio_stream::once(slice)).await
+                let slices = tokio_stream::once(slice);
+                way.answer(self.master.upload_scene(slices)).await
             }
             None => {
-                let slices = tokio_stream::iter(upload::slices(&self.scene));
-                self.master.upload_scene(slices).await
+                let goes = way.clone();
+                let slices = upload::slices(&self.scene).inspect(move |slice| goes.goes(slice));
+                let slices = tokio_stream::iter(slices);
+                way.answer(self.master.upload_scene(slices)).await
             }
         };
-        match response {
+        match self.answered("take the scene", answer) {
             Ok(response) => {
-                self.heard = Some(Instant::now());
                 let response = response.into_inner();
                 self.geometry_id = Some(response.geometry_id);
                 Ok(response.scene_id)
             }
-            Err(status) => {
-                let setback = self.setback("take the scene", status);
+            Err(setback) => {
                 if matches!(setback, Setback::Forgotten(_)) {
                     self.geometry_id = None;
                 }
@@ -447,10 +431,4 @@ impl Session {
             },
         }
     }
-}
-
-/// When a master that has no room wants to be asked again, if it says so.
-fn retry_after(status: &Status) -> Option<Duration> {
-    let seconds = status.metadata().get(RETRY_AFTER)?.to_str().ok()?;
-    seconds.parse().ok().map(Duration::from_secs)
 }
