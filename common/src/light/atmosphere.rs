@@ -74,7 +74,7 @@ mod tests {
         };
         let found = clear(&sun, 3.0, 1364.0);
         for (found, of_mass_1, per_mass) in [
-            (found.ghi_W_m2, 1038.159_219, -0.0387 * 3.0),
+            (found.ghi_W_m2, 1_038.159_219, -0.0387 * 3.0),
             (found.dni_W_m2, 942.208_186, -0.09 * 2.0),
         ] {
             let expected = of_mass_1 * f64::exp(per_mass * (air_mass(10.0) - 1.0));

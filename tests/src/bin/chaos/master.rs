@@ -18,7 +18,7 @@ use crate::record::Record;
 use crate::trouble::{Kind, Troubles};
 
 /// Arguments of the master besides its address and its state.
-fn arguments() -> [String; 22] {
+fn arguments() -> [String; 24] {
     let of = |number: f64| number.to_string();
     [
         "--lease".into(),
@@ -39,6 +39,9 @@ fn arguments() -> [String; 22] {
         of(bounds::RESULT_GIB),
         "--threads".into(),
         "2".into(),
+        // else hardly any job would go to workers
+        "--resident-memory".into(),
+        "0".into(),
         // less than all scenes need: most jobs go to workers
         "--state-size".into(),
         "0.01".into(),
