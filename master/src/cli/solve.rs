@@ -204,7 +204,12 @@ impl Task {
         // before the work, not after it
         check_place(&self.out)?;
         let Loaded { scene, inspection } = self.load()?;
-        if self.inputs.bands.iter().any(|band| band.photon_umol_J.is_some()) {
+        if self
+            .inputs
+            .bands
+            .iter()
+            .any(|band| band.photon_umol_J.is_some())
+        {
             let line = "photon factors are for `nestrad series` and `nestrad day`: the tables of `solve` are in W only";
             self.notes.say("warning", line);
         }

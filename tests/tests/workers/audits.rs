@@ -51,9 +51,8 @@ fn rows_that_are_scaled_or_left_out_are_refused_at_once() {
 #[test]
 fn a_result_with_more_entries_than_its_lines_can_give_takes_no_memory() {
     let (desk, expected) = maize(&[]);
-    // the rogue is silent while it computes, which takes long where others need the processor
-    let flags = ["--memory", "1", "--lease", "300"];
-    let mut solving = Solving::begin(desk.folder(), SCENE, "there", &flags);
+    let mut solving = Solving::begin(desk.folder(), SCENE, "there", &["--memory", "1"]);
+    // made before it joins: who is silent for long is forgotten
     let packed = vec![0xff; 128 << 20];
     let checksum = blake3::hash(&packed).as_bytes().to_vec();
     let rogue = Rogue::join(solving.address);
