@@ -48,13 +48,6 @@ impl Plan {
     }
 }
 
-impl PlanError {
-    /// Whether a coarser plan may do.
-    pub fn is_of_size(&self) -> bool {
-        matches!(self, Self::Memory { .. } | Self::Elements { .. })
-    }
-}
-
 /// The plan for the smallest error that is not too large. Larger errors are taken to give smaller plans.
 fn finest(planned: impl Fn(f64) -> Result<Plan, PlanError>) -> Result<Plan, PlanError> {
     let (mut low, mut high) = (0.0, 1.0);
