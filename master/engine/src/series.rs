@@ -66,8 +66,7 @@ impl Series {
             optics: &self.scene.optics,
             sources: &sources,
         };
-        let mut plan = Plan::of_traced(&lit, &self.settings, (&self.trace, &self.aims))?;
-        plan.trace = self.trace.clone();
+        let plan = Plan::of_traced(&lit, &self.settings, (&self.trace, &self.aims))?;
         let canopy = (&self.scene.canopy, &self.settings);
         Ok(self
             .resident
