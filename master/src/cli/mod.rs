@@ -7,6 +7,7 @@ mod exit;
 mod flags;
 mod generate;
 mod numbers;
+mod pool;
 mod record;
 mod remote;
 mod report;

@@ -11,7 +11,6 @@ use nestrad_common::inputs::Inputs;
 use nestrad_common::inspection::Inspection;
 use nestrad_common::options::{Diameter, Options, TableFormat};
 use nestrad_common::scene::Scene;
-use nestrad_common::threads::Threads;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::plan::{Estimator, Plan, Settings};
 use nestrad_engine::progress::Progress;
@@ -22,7 +21,6 @@ use nestrad_engine::stopwatch::{Stage, Stopwatch, Usage};
 use nestrad_results::summary::Summary;
 use nestrad_results::{Formats, check_place, stage, terminal};
 use nestrad_service::client::SolvedThere;
-use rayon::ThreadPoolBuilder;
 use serde::Deserialize;
 
 use super::bar::Bar;
@@ -30,6 +28,7 @@ use super::console::Notes;
 use super::exit::MissedTarget;
 use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
+use super::pool::pool;
 use super::record::OptionsRecord;
 use super::remote::MasterFlags;
 use super::settings::settings;
@@ -177,13 +176,7 @@ impl SolveArgs {
             out: self.results.out,
             place: self.place,
         };
-        let threads = Threads::asked(task.inputs.options.threads.unwrap_or(0));
-        if let Some(warning) = &threads.warning {
-            task.notes.say("warning", warning);
-        }
-        let pool = ThreadPoolBuilder::new().num_threads(threads.count).build();
-        pool.context("cannot start threads")?
-            .install(|| task.solve())
+        pool(task.inputs.options.threads, task.notes)?.install(|| task.solve())
     }
 }
 

@@ -3,12 +3,11 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use nestrad_common::assemble;
 use nestrad_common::inputs::Inputs;
 use nestrad_common::options::Options;
-use nestrad_common::threads::Threads;
 use nestrad_engine::plan::Settings;
 use nestrad_engine::progress::Progress;
 use nestrad_engine::run::Run;
@@ -18,12 +17,12 @@ use nestrad_results::trade::setting::grid;
 use nestrad_results::trade::study::carry_out;
 use nestrad_results::trade::table::Comparison;
 use nestrad_results::trade::{About, check_place, write};
-use rayon::ThreadPoolBuilder;
 
 use super::bar::Bar;
 use super::console::Notes;
 use super::flags::SceneFlags;
 use super::numbers::{positive, whole};
+use super::pool::pool;
 
 /// Try settings of `solve` on a scene, and say which is the fastest for each target error
 ///
@@ -85,13 +84,8 @@ impl TradeArgs {
             seed: how.seed,
             ..Options::default()
         })?;
-        let threads = Threads::asked(inputs.options.threads.unwrap_or(0));
-        if let Some(warning) = &threads.warning {
-            Notes { quiet: how.quiet }.say("warning", warning);
-        }
-        let pool = ThreadPoolBuilder::new().num_threads(threads.count).build();
-        pool.context("cannot start threads")?
-            .install(|| how.study(&inputs))
+        let notes = Notes { quiet: how.quiet };
+        pool(inputs.options.threads, notes)?.install(|| how.study(&inputs))
     }
 }
 

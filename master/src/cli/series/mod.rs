@@ -1,29 +1,32 @@
 //! `nestrad series` and `nestrad day`: one canopy under the light of many moments.
 
+mod pace;
 mod record;
+mod source;
+mod sums;
 mod task;
 
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use clap::Args;
 use jiff::SignedDuration;
 use jiff::civil::Date;
 use nestrad_common::assemble::load_weather;
 use nestrad_common::formats::weather::Weather;
 use nestrad_common::options::{Diameter, Options, TableFormat};
-use nestrad_common::threads::Threads;
 use nestrad_common::weather::{Day, SKY_NAMES, Site, SkyModel};
 use nestrad_engine::plan::Estimator;
-use rayon::ThreadPoolBuilder;
 
 use super::console::Notes;
-use super::flags::{CanopyFlags, misuse, named_number, once};
+use super::flags::{CanopyFlags, named_number, once};
 use super::numbers::{number, positive, whole};
+use super::pool::pool;
 use super::settings::settings;
+use source::Source;
 pub(super) use task::SeriesMemory;
-use task::{Source, Task};
+use task::Task;
 
 /// Compute the light of a canopy at every row of a weather file: a day, a season
 ///
@@ -201,13 +204,7 @@ fn carry_out(
         sky: site.sky,
         out: how.out,
     };
-    let threads = Threads::asked(task.inputs.options.threads.unwrap_or(0));
-    if let Some(warning) = &threads.warning {
-        task.notes.say("warning", warning);
-    }
-    let pool = ThreadPoolBuilder::new().num_threads(threads.count).build();
-    pool.context("cannot start threads")?
-        .install(|| task.carry_out())
+    pool(task.inputs.options.threads, task.notes)?.install(|| task.carry_out())
 }
 
 fn date(text: &str) -> Result<Date, String> {
@@ -245,9 +242,4 @@ fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
 
 fn sky(text: &str) -> Result<SkyModel, String> {
     text.parse().map_err(|_| format!("expected {SKY_NAMES}"))
-}
-
-/// A call that makes no sense for the scene that it is about.
-fn no_light_in_any() -> anyhow::Error {
-    misuse("there is no light at any moment: expected a row with light in some band")
 }

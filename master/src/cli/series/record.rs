@@ -2,9 +2,11 @@
 
 use nestrad_common::inputs::{Inputs, PatternInput};
 use nestrad_common::options::{Diameter, TableFormat, Unit, Up};
+use nestrad_common::weather::{Site, SkyModel};
+use nestrad_engine::plan::Settings;
 use serde::Serialize;
 
-use super::task::{Source, Task};
+use super::source::Source;
 use crate::cli::record::absolute;
 
 #[derive(Debug, Serialize)]
@@ -39,38 +41,37 @@ struct BandRecord<'a> {
 
 impl<'a> SeriesRecord<'a> {
     /// To be called where the work is done: it counts the threads there.
-    pub(super) fn of(task: &'a Task) -> Self {
-        let Inputs { options, .. } = &task.inputs;
-        let bands = task.inputs.bands.iter().map(|band| BandRecord {
+    pub(super) fn of(
+        inputs: &'a Inputs,
+        settings: &Settings,
+        (weather, sky, site): (&'a Source, SkyModel, Site),
+    ) -> Self {
+        let options = &inputs.options;
+        let bands = inputs.bands.iter().map(|band| BandRecord {
             name: &band.name,
             optics: band.optics.as_deref().map(absolute),
-            band_fraction: task.inputs.band_fraction.get(&band.name).copied(),
+            band_fraction: inputs.band_fraction.get(&band.name).copied(),
             photon_umol_J: band.photon_umol_J,
         });
         Self {
-            scenes: task
-                .inputs
-                .scenes
-                .iter()
-                .map(|path| absolute(path))
-                .collect(),
-            unit: task.inputs.unit.unwrap_or_default(),
-            up: task.inputs.up.unwrap_or_default(),
-            pattern: task.inputs.pattern.as_ref().map(|pattern| match pattern {
+            scenes: inputs.scenes.iter().map(|path| absolute(path)).collect(),
+            unit: inputs.unit.unwrap_or_default(),
+            up: inputs.up.unwrap_or_default(),
+            pattern: inputs.pattern.as_ref().map(|pattern| match pattern {
                 PatternInput::File(path) => absolute(path),
                 PatternInput::Corners(corners) => corners.map(|c| (c + 0.0).to_string()).join(" "),
             }),
-            soil: task.inputs.soil,
+            soil: inputs.soil,
             bands: bands.collect(),
-            weather: &task.source,
-            sky: task.sky.to_string(),
-            latitude_deg: task.place.latitude_deg,
-            longitude_deg: task.place.longitude_deg,
-            diameter: task.settings.diameter,
-            accuracy_percent: task.settings.accuracy_percent,
-            memory_GiB: task.settings.memory_GiB,
+            weather,
+            sky: sky.to_string(),
+            latitude_deg: site.latitude_deg,
+            longitude_deg: site.longitude_deg,
+            diameter: settings.diameter,
+            accuracy_percent: settings.accuracy_percent,
+            memory_GiB: settings.memory_GiB,
             threads: rayon::current_num_threads(),
-            seed: task.settings.seed,
+            seed: settings.seed,
             format: options.format.unwrap_or_default(),
         }
     }

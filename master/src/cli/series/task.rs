@@ -1,9 +1,7 @@
 //! The work of a series: weather to light, the canopy traced once, every moment lit, tables written.
 
-use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result};
 use nestrad_common::assemble::{Unlit, load_unlit};
@@ -17,19 +15,20 @@ use nestrad_engine::progress::Progress;
 use nestrad_engine::rounds::{Ended, Round, Solved};
 use nestrad_engine::run::Run;
 use nestrad_engine::series::Series;
-use nestrad_engine::solution::Balance;
 use nestrad_engine::stop::Stop;
 use nestrad_engine::stopwatch::Stopwatch;
 use nestrad_results::series::{
-    BandSum, Part, SeriesResult, SeriesSummary, SeriesTime, StepResult, check_place, key, write,
+    Part, SeriesResult, SeriesSummary, SeriesTime, StepResult, check_place, key, write,
 };
-use serde::Serialize;
 use thiserror::Error;
 
-use super::no_light_in_any;
+use super::pace::Pace;
 use super::record::SeriesRecord;
+use super::source::Source;
+use super::sums::{sums, table};
 use crate::cli::bar::Bar;
 use crate::cli::console::Notes;
+use crate::cli::flags::misuse;
 
 /// All that the user said.
 pub(super) struct Task {
@@ -41,19 +40,6 @@ pub(super) struct Task {
     pub(super) sky: SkyModel,
     pub(super) out: PathBuf,
     pub(super) notes: Notes,
-}
-
-/// Where the weather is from.
-#[derive(Clone, Debug, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Source {
-    File(String),
-    Day {
-        date: String,
-        every_s: f64,
-        turbidity: f64,
-        model: &'static str,
-    },
 }
 
 /// The moments of a series take more memory than allowed.
@@ -69,9 +55,6 @@ pub(crate) struct SeriesMemory {
     needed_GiB: f64,
     limit_GiB: f64,
 }
-
-/// Between two lines that say how far it is.
-const PAUSE: Duration = Duration::from_secs(5);
 
 /// Odd things about the light of rows are said for so many of them.
 const MOST_WARNINGS: usize = 3;
@@ -92,7 +75,9 @@ impl Task {
             band_fraction: &self.inputs.band_fraction,
         };
         let moments = to_light.moments(&self.weather)?;
-        let reference = brightest(&moments).ok_or_else(no_light_in_any)?;
+        let reference = brightest(&moments).ok_or_else(|| {
+            misuse("there is no light at any moment: expected a row with light in some band")
+        })?;
         let unlit = load_unlit(&self.inputs)?;
         self.warn(&unlit, &moments);
         let settings = self.shared_memory(&unlit, &moments)?;
@@ -150,7 +135,7 @@ impl Task {
             self.notes.say("warning", &line);
         }
         watch.lap("choice");
-        let mut told = Told::new(lit - known);
+        let mut pace = Pace::new(lit - known);
         for (number, moment) in moments.iter().enumerate() {
             let (Some(light), None) = (&moment.light, &steps[number]) else {
                 continue;
@@ -166,7 +151,7 @@ impl Task {
             let step = StepResult::of(&solution);
             part.add(number, &step)?;
             steps[number] = Some(step);
-            if let Some(line) = told.one_more() {
+            if let Some(line) = pace.one_more() {
                 self.notes.say("series", &line);
             }
         }
@@ -293,7 +278,11 @@ impl Task {
             self.inputs.options.format.unwrap_or_default(),
             &SeriesSummary {
                 version: env!("CARGO_PKG_VERSION"),
-                options: &SeriesRecord::of(self),
+                options: &SeriesRecord::of(
+                    &self.inputs,
+                    &self.settings,
+                    (&self.source, self.sky, self.place),
+                ),
                 scene: &unlit.inspection,
                 plan: &plan,
                 moments: moments.len(),
@@ -338,90 +327,4 @@ fn brightest(moments: &[Moment]) -> Option<&Moment> {
         }
     }
     best.map(|(_, moment)| moment)
-}
-
-fn sums(result: &SeriesResult<'_>) -> Vec<BandSum> {
-    let bands = result.bands.iter().zip(result.photon_umol_J).enumerate();
-    let sum = |(band, (name, photon_umol_J)): (usize, (&&str, &Option<f64>))| {
-        let over = |of: fn(&Balance) -> f64| {
-            let steps = result.times.iter().zip(result.steps);
-            let lit = steps.filter_map(|(time, step)| Some((time, step.as_ref()?)));
-            lit.map(|(time, step)| time.weight_s * of(&step.facts.balance[band]))
-                .sum()
-        };
-        BandSum {
-            band: (*name).to_owned(),
-            photon_umol_J: *photon_umol_J,
-            incoming_J: over(|b| b.incoming_W),
-            absorbed_plants_J: over(|b| b.absorbed_plants_W.value),
-            absorbed_soil_J: over(|b| b.absorbed_soil_W.value),
-            escaped_J: over(|b| b.escaped_up_W.value + b.escaped_down_W.value),
-            closure_J: over(|b| b.closure_W.value),
-        }
-    };
-    bands.map(sum).collect()
-}
-
-/// Sums over time for the terminal.
-fn table(sums: &[BandSum]) -> String {
-    let mut text =
-        "light over the series in MJ (per pattern, or per scene without one)\n".to_owned();
-    let head = ["band", "incoming", "plants", "soil", "escaped", "closure"];
-    let line = |cells: [String; 6]| {
-        let [band, rest @ ..] = cells;
-        let rest: String = rest.iter().map(|cell| format!("{cell:>12}")).collect();
-        format!("{band:<12}{rest}")
-    };
-    let mut add = |cells| {
-        // text takes all that it is given
-        let _ = writeln!(text, "{}", line(cells));
-    };
-    add(head.map(str::to_owned));
-    for sum in sums {
-        let mega = |joules: f64| format!("{:.5}", 1e-6 * joules);
-        add([
-            sum.band.clone(),
-            mega(sum.incoming_J),
-            mega(sum.absorbed_plants_J),
-            mega(sum.absorbed_soil_J),
-            mega(sum.escaped_J),
-            mega(sum.closure_J),
-        ]);
-    }
-    text
-}
-
-/// How far the moments are.
-struct Told {
-    begun: Instant,
-    last: Instant,
-    done: usize,
-    all: usize,
-}
-
-impl Told {
-    fn new(all: usize) -> Self {
-        let now = Instant::now();
-        Self {
-            begun: now,
-            last: now,
-            done: 0,
-            all,
-        }
-    }
-
-    /// What is to be said now that another moment is done.
-    fn one_more(&mut self) -> Option<String> {
-        self.done += 1;
-        if self.last.elapsed() < PAUSE && self.done < self.all {
-            return None;
-        }
-        self.last = Instant::now();
-        let each_s = self.begun.elapsed().as_secs_f64() / self.done as f64;
-        let left_s = each_s * (self.all - self.done) as f64;
-        Some(format!(
-            "{} of {} moments, about {left_s:.0} s left",
-            self.done, self.all
-        ))
-    }
 }
