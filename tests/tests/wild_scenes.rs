@@ -103,6 +103,13 @@ fn a_balance_that_does_not_close_is_refused() {
     refused(7564, UNBALANCED, "does not close");
 }
 
+/// Where no light comes, the solver left -3e-16 W m-2 on the soil.
+#[test]
+fn an_irradiance_was_below_0_by_a_rounding() {
+    let row = run(doubled(8_207_195));
+    assert!(row.verdict.is_ok(), "{:?}", row.verdict);
+}
+
 #[test]
 fn wild_scenes_with_doubled_faces_are_solved_soundly_or_refused() {
     for seed in 0..20 {
