@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Columns are known by their names, in any order: `time`; `ghi`, `dhi`, `dni` with or without `_W_m2`, in any case; and
-//! for a band of the name PAR `direct_PAR_W_m2` and `diffuse_PAR_W_m2`, both of the horizontal. Others are left aside.
+//! for a band of the name PAR `direct_PAR_W_m2` and `diffuse_PAR_W_m2`, both of the horizontal. Others are not used.
 //! Lines that begin with `#` are comments.
 
 use std::collections::BTreeMap;
@@ -26,7 +26,7 @@ pub struct Weather {
     pub file: String,
     /// At least two.
     pub rows: Vec<WeatherRow>,
-    /// Names of columns that were left aside.
+    /// Names of columns that are not used.
     pub unused: Vec<String>,
 }
 

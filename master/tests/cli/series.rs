@@ -72,7 +72,7 @@ fn number(row: &[(String, String)], name: &str) -> f64 {
 fn every_row_of_the_weather_is_a_light_and_sums_are_those_of_the_rows() {
     let desk = desk();
     let ran = desk.done(&series(&["--sky", "perez"]));
-    assert!(ran.stderr.contains("left aside: note"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("not used: note"), "{}", ran.stderr);
     let series = rows(&desk, "out/series.csv");
     let integrals = rows(&desk, "out/integrals.csv");
     // 3 organs, 2 bands, 5 moments

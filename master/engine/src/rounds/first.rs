@@ -24,8 +24,7 @@ pub(super) fn first(
     let aims = Aims::of(settings.accuracy_percent);
     let sources = sources_for(scene, &aims, settings);
     let plan = Plan::fitting(&lit_canopy(scene, &sources), settings);
-    // what a limit shapes is the same for all who ask for more than it allows: none of them ends with less
-    if !settings.in_rounds || plan.as_ref().is_ok_and(Plan::is_limited) {
+    if !settings.in_rounds {
         return Ok((sources, plan?));
     }
     let aims = Aims::pilot(settings.accuracy_percent);

@@ -177,7 +177,7 @@ impl Task {
         if !self.weather.unused.is_empty() {
             let names = self.weather.unused.join(", ");
             let line = format!(
-                "{}: columns that are left aside: {names}",
+                "{}: columns that are not used: {names}",
                 self.weather.file
             );
             self.notes.say("weather", &line);
@@ -194,7 +194,7 @@ impl Task {
             self.notes.say("warning", warning);
         }
         if more > 0 {
-            let line = format!("the same is true of {more} more rows");
+            let line = format!("{more} more rows have such a warning");
             self.notes.say("warning", &line);
         }
     }
