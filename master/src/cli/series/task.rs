@@ -176,10 +176,7 @@ impl Task {
         }
         if !self.weather.unused.is_empty() {
             let names = self.weather.unused.join(", ");
-            let line = format!(
-                "{}: columns that are not used: {names}",
-                self.weather.file
-            );
+            let line = format!("{}: columns that are not used: {names}", self.weather.file);
             self.notes.say("weather", &line);
         }
         let names = unlit.optics.names();
