@@ -69,7 +69,11 @@ pub struct Balance {
     pub escaped_up_W: Estimate,
     /// Leaves downwards into the void where there is no soil.
     pub escaped_down_W: Estimate,
-    /// `incoming - absorbed - escaped`: what the estimate does not account for.
+    /// Scattered where it first met something, and not followed: all that was scattered in a band that was not solved
+    /// for, nothing in others.
+    #[serde(default)]
+    pub scattered_W: Estimate,
+    /// `incoming - absorbed - escaped - scattered`: what the estimate does not account for.
     pub closure_W: Estimate,
     /// Absorbed by the triangles of each material, in the scene's order.
     #[serde(default)]
@@ -158,6 +162,9 @@ pub struct Solution {
     pub organ_area_m2: Vec<f64>,
     /// One-sided area of each triangle, m².
     pub triangle_area_m2: Vec<f64>,
+    /// One-sided area of each organ that the sun reaches on either side, m²: of the sources that are not directions of a
+    /// sky, the strongest. Empty without a sun.
+    pub organ_sunlit_m2: Vec<Estimate>,
     /// Where there is a soil plane.
     pub soil: Option<SoilMap>,
     /// One per band.
@@ -178,6 +185,7 @@ impl Solution {
             balance,
             organs: back(&self.organs, &order.organ, bands),
             organ_bias_W: back(&self.organ_bias_W, &order.organ, bands),
+            organ_sunlit_m2: back(&self.organ_sunlit_m2, &order.organ, 1),
             organ_area_m2: back(&self.organ_area_m2, &order.organ, 1),
             triangles: back(&self.triangles, &order.triangle, bands),
             triangle_area_m2: back(&self.triangle_area_m2, &order.triangle, 1),

@@ -20,6 +20,7 @@ mod projection;
 mod shadow;
 mod shares;
 mod sky;
+mod sunlit;
 mod systematic;
 mod tally;
 
@@ -32,6 +33,7 @@ use rayon::prelude::*;
 pub use effort::spread_effort;
 pub use kept::KeptDirections;
 pub use shares::ShareVariances;
+pub use sunlit::SunlitArea;
 
 use crate::frame::Frame;
 use crate::stop::Stopped;
@@ -68,6 +70,8 @@ pub struct Direct {
     /// What every other direction of a sky, and the others, would make organs absorb if they stood for all of
     /// it, W, indexed `organ * bands + band`; empty without such a sky.
     pub sky_halves_W: [Vec<f64>; 2],
+    /// What the sun reaches of each organ: see [`SunlitArea`]. Empty without a sun.
+    pub sunlit: Vec<SunlitArea>,
 }
 
 /// Sources are worked off in this many groups, an even number, each in order, which are then added in order: so the
@@ -104,6 +108,7 @@ pub fn direct_light_keeping(
     };
     let probe = Probe::new((&sources.list, line_area_m2), thin, seed);
     kept.next_light();
+    let sun = sunlit::sun_of(sources);
     let parts: Result<Vec<Direct>, Stopped> = groups(sources)
         .into_par_iter()
         .map(|group| {
@@ -118,11 +123,13 @@ pub fn direct_light_keeping(
                     towards: -source.direction,
                     line_area_m2: line_area_m2[k],
                     random: rng.random(),
+                    is_sun: sun == Some(k),
                 };
                 let lit = kept.lit_areas(&projection, seed, probe.is_some(), || {
                     projection.lit_areas(frame, (&areas, &classes), probe.as_ref(), &mut scratch)
                 });
                 part.add(frame, optics, &lit, source);
+                part.sunlit.extend_from_slice(&lit.sunlit);
             }
             Ok(part)
         })
@@ -144,6 +151,7 @@ pub fn direct_light_keeping(
         }
         add(&mut sum.passed_W, &part.passed_W);
         sum.lines += part.lines;
+        sum.sunlit.extend_from_slice(&part.sunlit);
     }
     let of_sky = &parts[..GROUPS.min(sources.sky_directions)];
     let of_sky: Vec<&[f64]> = of_sky.iter().map(|p| &p.irradiance_W_m2[..]).collect();
@@ -175,6 +183,7 @@ impl Direct {
             passed_W: vec![0.0; bands],
             lines: 0,
             sky_halves_W: Default::default(),
+            sunlit: Vec::new(),
         }
     }
 

@@ -132,6 +132,8 @@ fn check_counts(canopy: &Canopy, bands: usize, solution: &Solution) -> Result<()
     let soil = solution.soil.as_ref();
     let soil_cells = soil.map_or(0, |map| map.nx * map.ny);
     let soil_values = soil.map_or(0, |map| map.irradiance_W_m2.len());
+    let has_sun = !solution.organ_sunlit_m2.is_empty();
+    let sunlit_organs = if has_sun { organs } else { 0 };
     let of_triangles = canopy.triangles().map(|triangle| triangle.organ);
     for (what, expected, found) in [
         ("organ values", organs * bands, solution.organs.len()),
@@ -143,6 +145,11 @@ fn check_counts(canopy: &Canopy, bands: usize, solution: &Solution) -> Result<()
         ),
         ("organ areas", organs, solution.organ_area_m2.len()),
         ("triangle areas", triangles, solution.triangle_area_m2.len()),
+        (
+            "sunlit areas",
+            sunlit_organs,
+            solution.organ_sunlit_m2.len(),
+        ),
         ("soil values", soil_cells * bands, soil_values),
     ] {
         if expected != found {

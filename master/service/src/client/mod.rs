@@ -14,7 +14,7 @@ mod upload;
 
 use std::time::{Duration, Instant};
 
-use nestrad_common::options::Diameter;
+use nestrad_common::options::{Diameter, Scatter};
 use nestrad_common::scene::Scene;
 use nestrad_engine::plan::{DEFAULT_ACCURACY_PERCENT, Estimator, Settings};
 use nestrad_engine::progress::StageProgress;
@@ -115,6 +115,10 @@ fn options(settings: &Settings) -> v1::SolveOptions {
         Estimator::Lines => v1::Estimator::Lines,
         Estimator::Rays => v1::Estimator::Rays,
     };
+    let scatter = match settings.scatter {
+        Scatter::All => v1::Scatter::All,
+        Scatter::None => v1::Scatter::None,
+    };
     v1::SolveOptions {
         diameter_m: match settings.diameter {
             Diameter::Auto => None,
@@ -128,6 +132,7 @@ fn options(settings: &Settings) -> v1::SolveOptions {
         seed: Some(settings.seed),
         estimator: estimator.into(),
         budget_s: settings.budget_s,
+        scatter: scatter.into(),
     }
 }
 

@@ -47,6 +47,17 @@ impl<'a> Arriving<'a> {
                     return Err(RemoteError::Answer("organs that do not fit the scene"));
                 }
                 solution.organ_bias_W.extend(slice.absorbed_bias_w);
+                let sunlit = &mut solution.organ_sunlit_m2;
+                let (values, errors) = (slice.sunlit_area_m2, slice.sunlit_area_se_m2);
+                // empty without a sun
+                let none = values.is_empty() && sunlit.is_empty();
+                let known = sunlit.len() == solution.organ_area_m2.len();
+                let fits = known && values.len() == slice.area_m2.len();
+                if values.len() != errors.len() || !(none || fits) {
+                    return Err(RemoteError::Answer("organs that do not fit the scene"));
+                }
+                let both = values.into_iter().zip(errors);
+                sunlit.extend(both.map(|(value, se)| Estimate { value, se }));
                 append(
                     "organs",
                     (slice.first, self.scene.canopy.organs.len()),
@@ -230,6 +241,7 @@ fn balance(band: &v1::BandSummary, canopy: &Canopy) -> Result<Balance, RemoteErr
         absorbed_soil_W: estimate(band.absorbed_soil_w),
         escaped_up_W: estimate(band.escaped_up_w),
         escaped_down_W: estimate(band.escaped_down_w),
+        scattered_W: estimate(band.scattered_w),
         closure_W: estimate(band.closure_w),
         materials: materials.collect(),
     })

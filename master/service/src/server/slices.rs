@@ -63,7 +63,7 @@ fn parts(items: usize, item_bytes: usize) -> impl Iterator<Item = (usize, usize)
 fn end_of_organs(outcome: &HeldSolution, from: usize) -> usize {
     let mut bytes = 0;
     let fits = |organ: &&nestrad_common::canopy::Organ| {
-        bytes += (LIGHT_BYTES + 8) * outcome.bands.len() + 16 + 4;
+        bytes += (LIGHT_BYTES + 8) * outcome.bands.len() + 16 + 16 + 4;
         bytes += organ.id.len() + organ.plant.len() + organ.species.len();
         bytes <= SLICE_BYTES
     };
@@ -74,6 +74,8 @@ fn end_of_organs(outcome: &HeldSolution, from: usize) -> usize {
 fn organs(outcome: &HeldSolution, from: usize, to: usize) -> v1::OrganLight {
     let bands = outcome.bands.len();
     let organs = &outcome.organs[from..to];
+    let sunlit = outcome.solution.organ_sunlit_m2.get(from..to);
+    let sunlit = sunlit.unwrap_or_default();
     v1::OrganLight {
         first: from as u64,
         bands: outcome.bands.clone(),
@@ -83,6 +85,8 @@ fn organs(outcome: &HeldSolution, from: usize, to: usize) -> v1::OrganLight {
         area_m2: outcome.solution.organ_area_m2[from..to].to_vec(),
         light: light(&outcome.solution.organs[from * bands..to * bands]),
         absorbed_bias_w: outcome.solution.organ_bias_W[from * bands..to * bands].to_vec(),
+        sunlit_area_m2: sunlit.iter().map(|area| area.value).collect(),
+        sunlit_area_se_m2: sunlit.iter().map(|area| area.se).collect(),
     }
 }
 

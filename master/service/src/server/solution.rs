@@ -51,6 +51,7 @@ impl HeldSolution {
             escaped_up_w: quantity(balance.escaped_up_W),
             escaped_down_w: quantity(balance.escaped_down_W),
             closure_w: quantity(balance.closure_W),
+            scattered_w: quantity(balance.scattered_W),
             organ_error_percent: error.rms_percent,
             materials: balance.materials.iter().map(material).collect(),
         });
@@ -111,7 +112,7 @@ impl HeldSolution {
 fn bytes(triangles: usize, organs: usize, cells: usize, bands: usize) -> u64 {
     let light = bands * size_of::<ItemLight>();
     let of_triangles = triangles * (light + 12);
-    let of_organs = organs * (light + 8 * (bands + 1) + size_of::<Organ>());
+    let of_organs = organs * (light + 8 * (bands + 3) + size_of::<Organ>());
     (of_triangles + of_organs + cells * bands * size_of::<Estimate>() + (4 << 10)) as u64
 }
 

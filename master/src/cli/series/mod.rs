@@ -190,6 +190,7 @@ fn carry_out(
         memory_GiB: how.memory,
         threads: how.threads,
         seed: how.seed,
+        scatter: None,
         format: how.format,
         vtp: None,
     };
