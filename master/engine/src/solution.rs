@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 use nestrad_common::canopy::Kind;
+use nestrad_common::sensors::Sensor;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{Order, back};
@@ -28,6 +29,37 @@ pub struct ItemLight {
     pub absorbed_direct_W: f64,
     /// Standard error of `absorbed_W`, W.
     pub absorbed_se_W: f64,
+}
+
+/// What a sensor reads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The sensor, in metres relative to the scene's local origin.
+    pub sensor: Sensor,
+    /// One per band.
+    pub light: Vec<SensorLight>,
+}
+
+/// The light of a sensor in one band, W m⁻²; of radiance W m⁻² sr⁻¹.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorLight {
+    /// Straight from the sources.
+    pub direct: Estimate,
+    /// From what they light.
+    pub scattered: Estimate,
+    /// How far both together may be off besides their standard errors: by the size of elements and soil cells, by the
+    /// directions of a sky.
+    pub bias: f64,
+}
+
+impl SensorLight {
+    /// All of it.
+    pub fn total(&self) -> Estimate {
+        Estimate {
+            value: self.direct.value + self.scattered.value,
+            se: self.direct.se.hypot(self.scattered.se),
+        }
+    }
 }
 
 /// Irradiance of the soil plane on a regular grid of cells.
@@ -167,6 +199,8 @@ pub struct Solution {
     pub organ_sunlit_m2: Vec<Estimate>,
     /// Where there is a soil plane.
     pub soil: Option<SoilMap>,
+    /// What sensors read, in their order.
+    pub readings: Vec<Reading>,
     /// One per band.
     pub balance: Vec<Balance>,
     /// What the error of organs comes from, for each band in which something is absorbed.

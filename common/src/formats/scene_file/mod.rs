@@ -32,10 +32,12 @@
 //! `[light.sky]` with `kind = "uniform_overcast"`, `"standard_overcast"` or `"clear"`,
 //! `irradiance_W_m2 = { PAR = 400.0, NIR = 380.0 }`, and for a clear sky `time_utc`, `latitude_deg`,
 //! `longitude_deg`, `diffuse_fraction`. For weather (`nestrad series`, `nestrad day`) `[light.band_fraction]` says which
-//! part of broadband irradiance a band gets: `PAR = 0.48`. Paths are relative to the scene file.
+//! part of broadband irradiance a band gets: `PAR = 0.48`. `[[sensors]]` say where light is to be measured besides
+//! (`sensors.rs`). Paths are relative to the scene file.
 
 mod checks;
 mod hints;
+mod sensors;
 mod tables;
 #[cfg(test)]
 mod tests;

@@ -205,6 +205,7 @@ impl Plan {
             canopy,
             optics,
             sources,
+            ..
         } = *lit;
         limits::check_accuracy(aims.exchange_percent.min(aims.direct_percent))?;
         limits::check_overhang(canopy)?;

@@ -58,6 +58,7 @@ impl HeldScene {
             canopy: self.geometry().canopy.clone(),
             optics: self.lighting().optics.clone(),
             light: self.lighting().light.clone(),
+            sensors: Arc::default(),
         }
     }
 }
