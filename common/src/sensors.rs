@@ -11,7 +11,7 @@ pub const DEFAULT_RAYS: u32 = 4096;
 pub const RAYS: std::ops::RangeInclusive<u32> = 64..=1 << 20;
 
 /// Sensors of a scene, at most: cells of grids, sides and directions counted one by one.
-pub const MOST_SENSORS: usize = 100_000;
+pub const MOST_SENSORS: usize = 50_000;
 
 /// A sensor: one place, looking one way.
 #[derive(Clone, Debug, PartialEq)]

@@ -262,6 +262,7 @@ impl TracedCanopy {
             frame,
             optics,
             sources: light.sources,
+            direct,
             irradiance: &irradiance,
             scattering: &plan.scattering_bands,
             groups: self.scattering.as_ref().map(|s| &s.groups),

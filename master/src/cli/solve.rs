@@ -37,8 +37,8 @@ use super::workers::{Crew, WorkersFlags};
 
 /// Compute the light that every organ, triangle and soil cell of a canopy gets
 ///
-/// Writes organs.csv, triangles.csv, soil.csv (where there is a soil plane) and summary.json into DIR; after an
-/// error DIR is unchanged. The plan goes to stderr, a table of the energy balance to stdout.
+/// Writes organs.csv, triangles.csv, soil.csv (where there is a soil plane), sensors.csv and radiance.csv (where the scene
+/// file has [[sensors]]) and summary.json into DIR; after an error DIR is unchanged. The plan goes to stderr, a table of the energy balance to stdout.
 ///
 /// Exit codes: 0 success; 1 input that cannot be used; 2 wrong flags; 3 results were written, but a fault kept them
 /// from the asked accuracy; 4 a limit (memory, time, size, queue) does not allow it; 5 the master cannot be reached,

@@ -206,3 +206,7 @@ fn check_patch(corners: &[DVec3]) -> Result<(), String> {
     let corners: Vec<String> = corners.iter().map(DVec3::to_string).collect();
     Err(corners.join(", "))
 }
+
+#[cfg(test)]
+#[path = "sensors_tests.rs"]
+mod tests;

@@ -10,6 +10,10 @@ use crate::frame::Frame;
 /// coordinate: it sees past the face on both of its sides.
 const IN_FRONT: f64 = 1e-8;
 
+/// Rays that begin outside come into a box that is larger than the scene by this part of its largest side: nothing lies
+/// where they begin.
+const AROUND: f64 = 1e-3;
+
 /// The scene, as sensors see it.
 pub(super) struct Eyes<'a> {
     frame: &'a Frame,
@@ -54,12 +58,14 @@ impl<'a> Eyes<'a> {
     /// rays that begin inside.
     fn nearer(&self, origin: DVec3, direction: DVec3) -> DVec3 {
         let extent = &self.frame.world.extent;
+        let around = DVec3::splat(AROUND * (extent.max_m - extent.min_m).max_element());
+        let (low, high) = (extent.min_m - around, extent.max_m + around);
         let (mut enters, mut leaves) = (0.0f64, f64::INFINITY);
         // a pattern has no sides
         let axes = if extent.periodic { 2..3 } else { 0..3 };
         for axis in axes {
             let to = |bound: DVec3| (bound[axis] - origin[axis]) / direction[axis];
-            let (a, b) = (to(extent.min_m), to(extent.max_m));
+            let (a, b) = (to(low), to(high));
             // along a side that it lies in, a ray is in the box: no number is passed over
             (enters, leaves) = (enters.max(a.min(b)), leaves.min(a.max(b)));
         }

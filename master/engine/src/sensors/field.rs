@@ -4,10 +4,10 @@ use super::Surroundings;
 use crate::solver::Groups;
 
 /// What there is of each band.
-pub(super) const VARIANTS: usize = 5;
+pub(super) const VARIANTS: usize = 6;
 
 /// The radiosity of the first and of the second half of the exchange; the mean of both, were elements larger, or cells of
-/// the soil, put together in either way.
+/// the soil, put together in either way; and the variance of what each end sends out of direct light, W² m⁻⁴.
 #[derive(Clone, Copy)]
 pub(super) enum Variant {
     FirstHalf = 0,
@@ -15,6 +15,7 @@ pub(super) enum Variant {
     LargerElements = 2,
     LargerCells = 3,
     OtherLargerCells = 4,
+    DirectVariance = 5,
 }
 
 /// Radiosities, W m⁻², by end, band and variant.
@@ -48,6 +49,7 @@ impl Field {
             let [one, other] = groups.of_larger_cells(&mean);
             field.put(b, Variant::LargerCells, &one);
             field.put(b, Variant::OtherLargerCells, &other);
+            field.put(b, Variant::DirectVariance, &of_direct(around, b));
             field.put(b, Variant::FirstHalf, x);
             field.put(b, Variant::SecondHalf, y);
         }
@@ -70,6 +72,36 @@ impl Field {
         let places = self.values.iter_mut().skip(first).step_by(lanes);
         places.zip(radiosity).for_each(|(to, &from)| *to = from);
     }
+}
+
+/// The variance of what every row sends out of the direct light of a band, W² m⁻⁴: of an element in proportion to that
+/// of what it absorbs.
+fn of_direct(around: &Surroundings, b: usize) -> Vec<f64> {
+    let (frame, band, direct) = (around.frame, &around.optics.bands[b], around.direct);
+    let bands = around.optics.len();
+    let on = |row: usize| direct.irradiance_W_m2[row * bands + b];
+    let mut variances = vec![0.0; frame.ends.len()];
+    for (e, &t) in frame.triangle_of_element.iter().enumerate() {
+        let optics = band.materials[frame.material[t as usize] as usize];
+        let (upper, lower) = (on(2 * e), on(2 * e + 1));
+        let absorbed_W = frame.area_m2[e]
+            * (optics.upper.absorptance() * upper + optics.lower.absorptance() * lower);
+        if absorbed_W > 0.0 {
+            let relative = direct.element_variance_W2[e * bands + b] / (absorbed_W * absorbed_W);
+            let sent = [
+                optics.upper.rho * upper + optics.lower.tau * lower,
+                optics.lower.rho * lower + optics.upper.tau * upper,
+            ];
+            for (side, sent) in sent.into_iter().enumerate() {
+                variances[2 * e + side] = relative * sent * sent;
+            }
+        }
+    }
+    let cells = direct.soil_variance_W2_m4.iter().skip(b).step_by(bands);
+    let soil = variances[frame.ends.faces() as usize..].iter_mut();
+    soil.zip(cells)
+        .for_each(|(to, variance)| *to = band.soil_albedo * band.soil_albedo * variance);
+    variances
 }
 
 /// What every end sends out in a band by a half of the exchange, W m⁻².

@@ -17,6 +17,7 @@ use nestrad_common::sensors::Sensor;
 use nestrad_kernel::directions::{Purpose, stream};
 use rayon::prelude::*;
 
+use crate::direct::Direct;
 use crate::exchange::Outlook;
 use crate::frame::Frame;
 use crate::run::Run;
@@ -37,6 +38,8 @@ pub(crate) struct Surroundings<'a> {
     pub optics: &'a Optics,
     /// What it is lit by.
     pub sources: &'a Sources,
+    /// The light that comes straight from them.
+    pub direct: &'a Direct,
     /// Of the bands in `scattering`; in others nothing is scattered, or it is not followed.
     pub irradiance: &'a Irradiance,
     /// Numbers of the bands that were solved.

@@ -11,20 +11,23 @@ use crate::solution::Estimate;
 
 /// What is scattered to a sensor, per band.
 ///
-/// The standard error holds that of the rays, and half of what the two halves of the exchange differ by. The bias tells
-/// what the sensor would read were elements, or cells of the soil, larger, as that of organs does.
+/// The standard error holds that of the rays, half of what the two halves of the exchange differ by, and that of the
+/// direct light on what the rays meet. The bias tells what the sensor would read were elements, or cells of the soil, larger, as that of organs does.
 pub(super) fn of(field: &Field, eyes: &Eyes, sensor: &Sensor, rng: &mut impl RngExt) -> Vec<Part> {
+    let mut all_met = Vec::new();
     let sets: Vec<Vec<f64>> = match sensor.receives {
         // a ray is all that there is
         Receives::From(direction) => {
             let met = eyes.met(sensor, sensor.centre_m(), direction);
+            all_met.push(met);
             vec![field.at(met).to_vec()]
         }
         _ => (0..REPLICATES)
-            .map(|_| mean_of_set(field, eyes, sensor, &Points::new(rng)))
+            .map(|_| mean_of_set(field, eyes, sensor, &Points::new(rng), &mut all_met))
             .collect(),
     };
     let factor = sensor.of_unit_radiosity();
+    let of_direct = of_direct(field, all_met);
     let of_band = |b: usize| {
         let of = |variant: Variant| -> Vec<f64> {
             let values = sets.iter().map(|set| set[b * VARIANTS + variant as usize]);
@@ -49,7 +52,7 @@ pub(super) fn of(field: &Field, eyes: &Eyes, sensor: &Sensor, rng: &mut impl Rng
         Part {
             light: Estimate {
                 value,
-                se: (of_rays + halves * halves).sqrt(),
+                se: (of_rays + halves * halves + factor * factor * of_direct[b]).sqrt(),
             },
             bias: (elements * elements + soil).sqrt(),
         }
@@ -57,8 +60,28 @@ pub(super) fn of(field: &Field, eyes: &Eyes, sensor: &Sensor, rng: &mut impl Rng
     (0..field.bands()).map(of_band).collect()
 }
 
-/// Mean over a set of rays of what they meet.
-fn mean_of_set(field: &Field, eyes: &Eyes, sensor: &Sensor, points: &Points<4>) -> Vec<f64> {
+/// Variance of the mean over ends that were met, each as often as it stands here, by that of the direct light on them.
+fn of_direct(field: &Field, mut met: Vec<u32>) -> Vec<f64> {
+    met.sort_unstable();
+    let mut variances = vec![0.0; field.bands()];
+    for same in met.chunk_by(|a, b| a == b) {
+        let part = same.len() as f64 / met.len() as f64;
+        let values = field.at(same[0]);
+        for (b, variance) in variances.iter_mut().enumerate() {
+            *variance += part * part * values[b * VARIANTS + Variant::DirectVariance as usize];
+        }
+    }
+    variances
+}
+
+/// Mean over a set of rays of what they meet, which is told too.
+fn mean_of_set(
+    field: &Field,
+    eyes: &Eyes,
+    sensor: &Sensor,
+    points: &Points<4>,
+    all_met: &mut Vec<u32>,
+) -> Vec<f64> {
     let rays = sensor.rays / REPLICATES;
     let mut sums = vec![0.0; field.bands() * VARIANTS];
     for j in 0..rays {
@@ -69,6 +92,7 @@ fn mean_of_set(field: &Field, eyes: &Eyes, sensor: &Sensor, points: &Points<4>) 
             Receives::From(direction) => direction,
         };
         let met = eyes.met(sensor, sensor.shape.point_m([p, q]), direction);
+        all_met.push(met);
         for (sum, value) in sums.iter_mut().zip(field.at(met)) {
             *sum += value;
         }

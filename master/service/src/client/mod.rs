@@ -8,6 +8,7 @@
 mod error;
 mod on_the_way;
 mod results;
+mod sensors;
 mod setback;
 mod solved;
 mod upload;
@@ -297,6 +298,7 @@ impl Session {
         let request = v1::StartSolveRequest {
             scene_id,
             options: Some(self.options),
+            sensors: sensors::list(&self.scene.sensors),
         };
         let answer = timeout(ANSWER, self.master.start_solve(request)).await;
         let response = self.answered("start the solve", answer)?;
@@ -360,12 +362,18 @@ impl Session {
         let doing = "give out the results";
         let scene = self.scene.clone();
         let mut arriving = Arriving::new(&scene);
-        for table in [
+        let tables = [
             v1::ResultTable::Organs,
             v1::ResultTable::Triangles,
             v1::ResultTable::Soil,
+            v1::ResultTable::Sensors,
             v1::ResultTable::Summary,
-        ] {
+        ];
+        // a master of an earlier version knows no sensors
+        let wanted = |table: &v1::ResultTable| {
+            *table != v1::ResultTable::Sensors || !scene.sensors.is_empty()
+        };
+        for table in tables.into_iter().filter(wanted) {
             let request = v1::FetchResultsRequest {
                 solve_id: id.to_owned(),
                 table: table.into(),

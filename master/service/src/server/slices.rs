@@ -7,7 +7,7 @@ use v1::result_slice::Part;
 
 use super::error::{ErrorCode, ServiceError};
 use super::solution::HeldSolution;
-use nestrad_engine::solution::{ItemLight, SoilMap};
+use nestrad_engine::solution::{ItemLight, SensorLight, SoilMap};
 
 /// Bytes of an item's numbers in each band, as they travel.
 const LIGHT_BYTES: usize = 5 * 8;
@@ -41,11 +41,16 @@ pub(super) fn of(
                 Some(slice(Part::Soil(soil_cells(&outcome, map, a, b))))
             }))
         }
+        v1::ResultTable::Sensors => {
+            let readings = outcome.solution.readings.len();
+            let parts = parts(readings, LIGHT_BYTES * outcome.bands.len());
+            Box::new(parts.map(move |(a, b)| slice(Part::Sensors(readings_of(&outcome, a, b)))))
+        }
         v1::ResultTable::Summary => Box::new(std::iter::once(slice(Part::Summary(
             outcome.summary.clone(),
         )))),
         v1::ResultTable::Unspecified => {
-            let message = "table: expected organs, triangles, soil or summary";
+            let message = "table: expected organs, triangles, soil, sensors or summary";
             return Err(ServiceError::new(ErrorCode::Invalid, message));
         }
     })
@@ -98,6 +103,23 @@ fn triangles(outcome: &HeldSolution, from: usize, to: usize) -> v1::TriangleLigh
         organ: outcome.organ[from..to].to_vec(),
         area_m2: outcome.solution.triangle_area_m2[from..to].to_vec(),
         light: light(&outcome.solution.triangles[from * bands..to * bands]),
+    }
+}
+
+fn readings_of(outcome: &HeldSolution, from: usize, to: usize) -> v1::SensorReadings {
+    let readings = &outcome.solution.readings[from..to];
+    let column = |of: fn(&SensorLight) -> f64| {
+        let lights = readings.iter().flat_map(|reading| &reading.light);
+        lights.map(of).collect()
+    };
+    v1::SensorReadings {
+        first: from as u64,
+        bands: outcome.bands.clone(),
+        direct_w_m2: column(|light| light.direct.value),
+        direct_se_w_m2: column(|light| light.direct.se),
+        scattered_w_m2: column(|light| light.scattered.value),
+        scattered_se_w_m2: column(|light| light.scattered.se),
+        bias_w_m2: column(|light| light.bias),
     }
 }
 

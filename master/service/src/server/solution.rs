@@ -3,7 +3,9 @@
 use nestrad_common::canopy::Organ;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::rounds::Solved;
-use nestrad_engine::solution::{Estimate, ItemLight, MaterialLight, Solution};
+use nestrad_engine::solution::{
+    Estimate, ItemLight, MaterialLight, Reading, SensorLight, Solution,
+};
 use nestrad_engine::stopwatch::{Stage, Usage};
 use nestrad_proto::v1;
 
@@ -96,7 +98,8 @@ impl HeldSolution {
         let canopy = &scene.geometry().canopy;
         let bands = scene.lighting().optics.len();
         let names: usize = canopy.organs.iter().map(name_bytes).sum();
-        bytes(canopy.len(), canopy.organs.len(), 0, bands) + names as u64
+        let readings = reading_bytes(scene.sensors().len(), bands);
+        bytes(canopy.len(), canopy.organs.len(), 0, bands) + names as u64 + readings
     }
 
     /// Bytes that these results take.
@@ -105,7 +108,8 @@ impl HeldSolution {
         let cells = soil.map_or(0, |map| map.nx * map.ny);
         let names: usize = self.organs.iter().map(name_bytes).sum();
         let (triangles, organs) = (self.organ.len(), self.organs.len());
-        bytes(triangles, organs, cells, self.bands.len()) + names as u64
+        let readings = reading_bytes(self.solution.readings.len(), self.bands.len());
+        bytes(triangles, organs, cells, self.bands.len()) + names as u64 + readings
     }
 }
 
@@ -115,6 +119,13 @@ fn bytes(triangles: usize, organs: usize, cells: usize, bands: usize) -> u64 {
     let of_organs = organs * (light + 8 * (bands + 3) + size_of::<Organ>());
     (of_triangles + of_organs + cells * bands * size_of::<Estimate>() + (4 << 10)) as u64
 }
+
+fn reading_bytes(readings: usize, bands: usize) -> u64 {
+    (readings * (size_of::<Reading>() + MOST_NAME_BYTES + bands * size_of::<SensorLight>())) as u64
+}
+
+/// Bytes of the name of a sensor, about: hardly any is longer.
+const MOST_NAME_BYTES: usize = 32;
 
 fn name_bytes(organ: &Organ) -> usize {
     organ.id.len() + organ.plant.len() + organ.species.len()

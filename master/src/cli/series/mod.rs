@@ -205,6 +205,10 @@ fn carry_out(
         sky: site.sky,
         out: how.out,
     };
+    if !task.inputs.sensors.is_empty() {
+        let line = "sensors are for `nestrad solve`: a series does not read them";
+        task.notes.say("warning", line);
+    }
     pool(task.inputs.options.threads, task.notes)?.install(|| task.carry_out())
 }
 
