@@ -199,3 +199,39 @@ fn the_command_line_a_scene_file_and_a_master_give_the_same_bytes() {
     desk.done(&["solve", "first.toml", "--out", "whole", "--scatter", "all"]);
     assert!(by_flag != desk.tables("whole"));
 }
+
+/// A leaf of 0.2 m over one of 0.4 m that stands on its side to half of the sun: of the first all is sunlit, of the
+/// second three quarters, whichever side is up; of a folded leaf the half that the sun reaches.
+#[test]
+fn the_sun_reaches_what_stands_in_nobodys_shade() {
+    let mut scenery = Scenery::open();
+    scenery.level("small", DVec3::new(0.1, 0.1, 0.2), DVec2::splat(0.2));
+    let corners = [[0.0, 0.0], [0.0, 0.4], [0.4, 0.4], [0.4, 0.0]];
+    // its lower side is up
+    scenery.quad("large", corners.map(|[x, y]| DVec3::new(x, y, 0.0)));
+    // a wall that the sun does not see, and one that it sees
+    let wall = [[0.0, 0.0], [0.3, 0.0], [0.3, 0.3], [0.0, 0.3]];
+    scenery.quad("wall", wall.map(|[x, z]| DVec3::new(2.0 + x, 1.0, z)));
+    scenery.quad("slope", wall.map(|[x, z]| DVec3::new(4.0 + x, z, z)));
+    scenery.band("B", 0.0, &[]);
+    let dark = solve(&scenery.scene(), &first_order()).solution;
+    assert!(dark.organ_sunlit_m2.is_empty());
+    // a weaker one from the side does not count
+    scenery.source(DVec3::new(0.0, 1.0, -1.0), 10.0);
+    scenery.source(DVec3::NEG_Z, 500.0);
+    let solution = solve(&scenery.scene(), &first_order()).solution;
+    for (id, expected) in [
+        ("small", 0.04),
+        ("large", 0.12),
+        ("wall", 0.0),
+        ("slope", 0.3 * 0.3 * 2f64.sqrt()),
+    ] {
+        let organ = scenery.organ(id);
+        let sunlit = solution.organ_sunlit_m2[organ];
+        let area_m2 = solution.organ_area_m2[organ];
+        assert!(sunlit.value <= area_m2 * (1.0 + 1e-12), "{id}: {sunlit:?}");
+        assert!(sunlit.se < 0.01 * area_m2, "{id}: {sunlit:?}");
+        let bound = (4.0 * sunlit.se).max(1e-9);
+        assert_within(id, sunlit.value, expected, bound);
+    }
+}

@@ -90,9 +90,18 @@ pub(super) fn of_organs(
         } else {
             0.0
         };
+        let of_outline = variance_m4 * scale * scale;
+        let variance_m4 = if thin.organ[o] {
+            of_outline
+        } else {
+            // a lattice counts better than points at random, and an outline of its own does not move the part that is lit
+            let part = (known.seen + 0.5) / (known.looked + 1.0);
+            let at_random = part * (1.0 - part) / known.looked.max(1.0);
+            of_outline.min(at_random * areas.organ_m2[o] * areas.organ_m2[o])
+        };
         SunlitArea {
             area_m2: known.lit_m2 + part * known.unmet_m2,
-            variance_m4: variance_m4 * scale * scale,
+            variance_m4,
         }
     });
     sunlit.collect()
