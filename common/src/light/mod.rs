@@ -68,6 +68,11 @@ impl Source {
         let azimuth = towards.x.atan2(towards.y).to_degrees().rem_euclid(360.0);
         if azimuth < 360.0 { azimuth } else { 0.0 }
     }
+
+    /// Irradiance of a plane that faces it, all bands together, W m⁻².
+    pub fn intensity_W_m2(&self) -> f64 {
+        self.irradiance_W_m2.iter().sum::<f64>() / -self.direction.z
+    }
 }
 
 /// The parallel sources that a light is computed as.

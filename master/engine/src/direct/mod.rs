@@ -119,8 +119,8 @@ pub fn direct_light_keeping(
                     line_area_m2: line_area_m2[k],
                     random: rng.random(),
                 };
-                let lit = kept.lit_areas(&projection, seed, probe.is_some(), || {
-                    projection.lit_areas(frame, (&areas, &classes), probe.as_ref(), &mut scratch)
+                let lit = kept.lit_areas(&projection, seed, probe.serves(k), || {
+                    projection.lit_areas(frame, (&areas, &classes), &probe, &mut scratch)
                 });
                 part.add(frame, optics, &lit, source);
             }
