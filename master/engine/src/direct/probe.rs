@@ -29,9 +29,9 @@ const MOST_RAYS: f64 = 2e5;
 const ALIKE: f64 = 0.5;
 
 /// The scene as rays see it.
-pub(super) struct Probe {
+pub(super) struct Probe<'a> {
     /// Made when the first ray is cast: directions that are kept need none.
-    tracer: OnceLock<Tracer>,
+    tracer: &'a OnceLock<Tracer>,
     seed: u64,
     /// Whether rays go to each source.
     of_source: Vec<bool>,
@@ -78,18 +78,18 @@ impl Thin {
     }
 }
 
-impl Probe {
+impl<'a> Probe<'a> {
     /// For organs that are too small for the lattices of these cross-sections (m², per source); `thin` counts them.
     pub(super) fn new(
         (sources, line_area_m2): (&[Source], &[f64]),
         thin: impl Fn(&Source, f64) -> usize + Sync,
-        seed: u64,
+        (tracer, seed): (&'a OnceLock<Tracer>, u64),
     ) -> Self {
         let thin = |k: usize| thin(&sources[k], line_area_m2[k]);
         let organs: Vec<usize> = (0..sources.len()).into_par_iter().map(thin).collect();
         let strength: Vec<f64> = sources.iter().map(Source::intensity_W_m2).collect();
         Self {
-            tracer: OnceLock::new(),
+            tracer,
             seed,
             of_source: strongest_first(&strength, &organs),
         }
