@@ -10,6 +10,9 @@ pub const DEFAULT_RAYS: u32 = 4096;
 /// Rays of a sensor, at least and at most.
 pub const RAYS: std::ops::RangeInclusive<u32> = 64..=1 << 20;
 
+/// Bytes of a sensor's name, at most.
+pub const MAX_SENSOR_NAME_BYTES: usize = 255;
+
 /// Sensors of a scene, at most: cells of grids, sides and directions counted one by one.
 pub const MOST_SENSORS: usize = 50_000;
 

@@ -28,10 +28,9 @@ use toml::Spanned;
 use super::super::error::FormatError;
 use super::Text;
 use super::tables::{GridTable, SensorTable};
-use crate::canopy::MAX_NAME_BYTES;
 use crate::formats::MAX_COORDINATE;
 use crate::inputs::{SensorInput, SensorPlaces};
-use crate::sensors::{DEFAULT_RAYS, RAYS};
+use crate::sensors::{DEFAULT_RAYS, MAX_SENSOR_NAME_BYTES, RAYS};
 
 /// What all tables say, checked; names differ.
 pub(super) fn inputs(
@@ -77,8 +76,8 @@ fn input(table: SensorTable) -> Result<SensorInput, Fault> {
         ),
         found,
     };
-    if !(1..=MAX_NAME_BYTES).contains(&name.len()) {
-        let expected = format!("a name of 1 to {MAX_NAME_BYTES} bytes");
+    if !(1..=MAX_SENSOR_NAME_BYTES).contains(&name.len()) {
+        let expected = format!("a name of 1 to {MAX_SENSOR_NAME_BYTES} bytes");
         return Err(fault(&expected, format!("{} bytes", name.len())));
     }
     let rays = rays.unwrap_or(DEFAULT_RAYS);

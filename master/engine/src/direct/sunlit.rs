@@ -21,7 +21,7 @@ pub struct SunlitArea {
 pub(super) fn sun_of(sources: &Sources) -> Option<usize> {
     let mut strongest = (None, 0.0);
     for (k, source) in sources.list.iter().enumerate().skip(sources.sky_directions) {
-        let intensity = source.irradiance_W_m2.iter().sum::<f64>() / -source.direction.z;
+        let intensity = source.intensity_W_m2();
         if intensity > strongest.1 {
             strongest = (Some(k), intensity);
         }

@@ -1,6 +1,7 @@
 //! What came of a solve, as long as it is kept.
 
 use nestrad_common::canopy::Organ;
+use nestrad_common::sensors::Sensor;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::rounds::Solved;
 use nestrad_engine::solution::{
@@ -98,7 +99,7 @@ impl HeldSolution {
         let canopy = &scene.geometry().canopy;
         let bands = scene.lighting().optics.len();
         let names: usize = canopy.organs.iter().map(name_bytes).sum();
-        let readings = reading_bytes(scene.sensors().len(), bands);
+        let readings = reading_bytes(scene.sensors().iter(), bands);
         bytes(canopy.len(), canopy.organs.len(), 0, bands) + names as u64 + readings
     }
 
@@ -108,7 +109,8 @@ impl HeldSolution {
         let cells = soil.map_or(0, |map| map.nx * map.ny);
         let names: usize = self.organs.iter().map(name_bytes).sum();
         let (triangles, organs) = (self.organ.len(), self.organs.len());
-        let readings = reading_bytes(self.solution.readings.len(), self.bands.len());
+        let readings = self.solution.readings.iter().map(|reading| &reading.sensor);
+        let readings = reading_bytes(readings, self.bands.len());
         bytes(triangles, organs, cells, self.bands.len()) + names as u64 + readings
     }
 }
@@ -120,12 +122,11 @@ fn bytes(triangles: usize, organs: usize, cells: usize, bands: usize) -> u64 {
     (of_triangles + of_organs + cells * bands * size_of::<Estimate>() + (4 << 10)) as u64
 }
 
-fn reading_bytes(readings: usize, bands: usize) -> u64 {
-    (readings * (size_of::<Reading>() + MOST_NAME_BYTES + bands * size_of::<SensorLight>())) as u64
+fn reading_bytes<'a>(sensors: impl Iterator<Item = &'a Sensor>, bands: usize) -> u64 {
+    let of_bands = bands * size_of::<SensorLight>();
+    let bytes = sensors.map(|sensor| size_of::<Reading>() + sensor.name.len() + of_bands);
+    bytes.sum::<usize>() as u64
 }
-
-/// Bytes of the name of a sensor, about: hardly any is longer.
-const MOST_NAME_BYTES: usize = 32;
 
 fn name_bytes(organ: &Organ) -> usize {
     organ.id.len() + organ.plant.len() + organ.species.len()

@@ -4,8 +4,10 @@ use std::sync::Arc;
 
 use glam::DVec3;
 use nestrad_common::assemble::check_sensor;
-use nestrad_common::canopy::{Canopy, MAX_NAME_BYTES};
-use nestrad_common::sensors::{DEFAULT_RAYS, MOST_SENSORS, Receives, Sensor, Shape};
+use nestrad_common::canopy::Canopy;
+use nestrad_common::sensors::{
+    DEFAULT_RAYS, MAX_SENSOR_NAME_BYTES, MOST_SENSORS, Receives, Sensor, Shape,
+};
 use nestrad_proto::v1;
 use v1::sensor::Receives as Sent;
 
@@ -26,9 +28,9 @@ pub(in crate::server) fn sensors(
         ));
     }
     for (index, name) in names.iter().enumerate() {
-        if !(1..=MAX_NAME_BYTES).contains(&name.len()) {
+        if !(1..=MAX_SENSOR_NAME_BYTES).contains(&name.len()) {
             let place = format_args!("sensors.names[{index}]");
-            let wanted = format_args!("1 to {MAX_NAME_BYTES} bytes");
+            let wanted = format_args!("1 to {MAX_SENSOR_NAME_BYTES} bytes");
             return Err(ServiceError::invalid(place, wanted, name.len()));
         }
     }

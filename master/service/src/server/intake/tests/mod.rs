@@ -2,6 +2,7 @@
 
 mod light;
 mod random;
+mod sensors;
 
 use nestrad_common::canopy::{Canopy, Material};
 use nestrad_common::options::{Diameter, Scatter};
