@@ -16,6 +16,7 @@ pub(super) fn of(lit: &LitCanopy, settings: &Settings, plan: &Plan) -> Vec<Strin
     lines.push(field(lit.canopy, settings, plan));
     lines.push(faces(lit.canopy));
     lines.push(soil(lit.canopy, plan));
+    lines.extend(sensors(lit));
     lines.push(format!(
         "memory: about {:.2} GiB (program {:.2}, scene {:.2}, rows {:.2}, solver {:.2}) of {} GiB allowed",
         plan.memory.total_GiB(),
@@ -152,6 +153,21 @@ fn faces(canopy: &Canopy) -> String {
         "faces: two for each of {} triangles; {solid} of them enclose solids, and parts of leaves inside a solid are dark",
         canopy.len()
     )
+}
+
+/// What is read after each solve.
+fn sensors(lit: &LitCanopy) -> Option<String> {
+    let rays: u64 = lit
+        .sensors
+        .iter()
+        .map(|sensor| u64::from(sensor.rays))
+        .sum();
+    let count = lit.sensors.len();
+    (count > 0).then(|| {
+        format!(
+            "sensors: {count}, by {rays} rays for scattered light and one or more to each source"
+        )
+    })
 }
 
 fn soil(canopy: &Canopy, plan: &Plan) -> String {
