@@ -95,6 +95,8 @@ fn on_bare_ground_there_is_the_irradiance_above_and_what_the_soil_sends_back() {
             // half sky, half ground, and no sun
             facing(at, DVec3::new(1.0, 0.0, 0.0)),
             sphere(at),
+            looking(at, DVec3::new(0.3, 0.2, 0.1)),
+            looking(at, -DVec3::Z),
         ];
         let read = read(&scenery, &coarse());
         let (sun, sky, back) = (400.0, 100.0, 0.3 * 500.0);
@@ -116,6 +118,8 @@ fn on_bare_ground_there_is_the_irradiance_above_and_what_the_soil_sends_back() {
         let scalar = sun / cosine + 2.0 * sky;
         assert_reads("sphere", read[5].direct.value, scalar, 3e-3);
         assert_reads("sphere, ground", read[5].scattered.value, 2.0 * back, 5e-3);
+        assert_reads("radiance of the sky", read[6].direct.value, sky / PI, 1e-9);
+        assert_eq!((read[6].scattered.value, read[7].direct.value), (0.0, 0.0));
         // on the ground, looking down, there is one cell of the soil
         for light in [0, 1, 2, 4, 5].map(|k| read[k]) {
             assert!(light.total().se <= 0.02 * light.total().value, "{light:?}");
