@@ -116,8 +116,9 @@ fn of_half(around: &Surroundings, (k, b): (usize, usize), half: usize) -> Vec<f6
         radiosity[2 * e] = optics.upper.rho * upper + optics.lower.tau * lower;
         radiosity[2 * e + 1] = optics.lower.rho * lower + optics.upper.tau * upper;
     }
-    for row in ends.faces() as usize..frame.rows() {
-        radiosity[row] = band.soil_albedo * on(row);
+    let soil = ends.faces() as usize..frame.rows();
+    for (row, out) in soil.clone().zip(&mut radiosity[soil]) {
+        *out = band.soil_albedo * on(row);
     }
     let all = around.optics.len();
     let (of_zones, beyond) = around

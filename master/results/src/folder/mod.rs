@@ -137,8 +137,8 @@ fn check_counts(canopy: &Canopy, bands: usize, solution: &Solution) -> Result<()
     let soil = solution.soil.as_ref();
     let soil_cells = soil.map_or(0, |map| map.nx * map.ny);
     let soil_values = soil.map_or(0, |map| map.irradiance_W_m2.len());
-    let lights = solution.readings.iter().map(|reading| reading.light.len());
-    if let Some(found) = lights.filter(|&found| found != bands).next() {
+    let mut lights = solution.readings.iter().map(|reading| reading.light.len());
+    if let Some(found) = lights.find(|&found| found != bands) {
         return Err(OutputError::Mismatch {
             what: "bands of a sensor",
             expected: bands,
