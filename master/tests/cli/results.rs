@@ -38,7 +38,7 @@ fn tables_are_complete_and_finite() {
     for (table, head, rows) in [
         (
             &organs,
-            "species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W",
+            "species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W,sunlit_area_m2,shaded_area_m2,sunlit_area_se_m2",
             3 * bands,
         ),
         (
