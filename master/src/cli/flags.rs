@@ -4,8 +4,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 use anyhow::Result;
-use clap::error::ErrorKind;
 use clap::Args;
+use clap::error::ErrorKind;
 use nestrad_common::assemble;
 use nestrad_common::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
 use nestrad_common::light::{Sky, SkyModel, SunnySky};
