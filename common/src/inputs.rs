@@ -3,6 +3,8 @@
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
+use glam::DVec3;
+use serde::Deserialize;
 use thiserror::Error;
 
 use crate::canopy::Kind;
@@ -34,6 +36,8 @@ pub struct Inputs {
     pub light: Option<LightInput>,
     /// Which part of broadband irradiance each band gets, by its name, for weather: above 0 to 1.
     pub band_fraction: BTreeMap<String, f64>,
+    /// Where light is to be measured besides.
+    pub sensors: Vec<SensorInput>,
     /// How to solve.
     pub options: Options,
 }
@@ -66,6 +70,11 @@ impl Inputs {
             } else {
                 self.band_fraction
             },
+            sensors: if self.sensors.is_empty() {
+                other.sensors
+            } else {
+                self.sensors
+            },
             options: self.options.over(other.options),
         }
     }
@@ -87,6 +96,66 @@ pub struct KindsInput {
     pub materials: BTreeMap<String, Kind>,
     /// All of a CAN species, by its number.
     pub species: BTreeMap<u32, Kind>,
+}
+
+/// Places where light is to be measured; lengths in [`Inputs::unit`], z up.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SensorInput {
+    /// The user's name for them.
+    pub name: String,
+    /// Where they are.
+    pub places: SensorPlaces,
+    /// Rays of each.
+    pub rays: u32,
+}
+
+/// Where sensors are, and what they measure.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SensorPlaces {
+    /// Points of a plane, and radiance at them.
+    Points {
+        /// Where.
+        at: Vec<DVec3>,
+        /// The plane's, towards its upper side: of any length above 0.
+        normal: DVec3,
+        /// Of irradiance.
+        sides: Sides,
+        /// Directions from which radiance is wanted: of any length above 0.
+        radiance_from: Vec<DVec3>,
+    },
+    /// The mean over a triangle or a parallelogram, whose upper side sees its corners turn to the left.
+    Patch {
+        /// Three or four.
+        corners: Vec<DVec3>,
+        /// Of irradiance.
+        sides: Sides,
+    },
+    /// Cells of horizontal grids, the mean over each.
+    Grid {
+        /// x, y of two opposite corners.
+        corners: [f64; 4],
+        /// Along x and y.
+        cells: [u32; 2],
+        /// A grid at each.
+        heights: Vec<f64>,
+        /// Of irradiance.
+        sides: Sides,
+    },
+    /// Points that receive from everywhere.
+    Spheres(Vec<DVec3>),
+}
+
+/// Sides of a sensor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sides {
+    /// The one that its normal points to.
+    #[default]
+    Upper,
+    /// The other one.
+    Lower,
+    /// Each for itself.
+    Both,
 }
 
 /// A wavelength band and where its optical properties are.

@@ -23,5 +23,6 @@ pub mod options;
 pub mod panics;
 pub mod printable;
 pub mod scene;
+pub mod sensors;
 pub mod threads;
 pub mod weather;

@@ -28,6 +28,8 @@ pub struct Options {
     pub threads: Option<usize>,
     /// Seed of all random choices.
     pub seed: Option<u64>,
+    /// Whether light is followed after it was scattered.
+    pub scatter: Option<Scatter>,
     /// Form of the result tables.
     pub format: Option<TableFormat>,
     /// Write a file for ParaView too.
@@ -44,6 +46,7 @@ impl Options {
             memory_GiB: self.memory_GiB.or(other.memory_GiB),
             threads: self.threads.or(other.threads),
             seed: self.seed.or(other.seed),
+            scatter: self.scatter.or(other.scatter),
             format: self.format.or(other.format),
             vtp: self.vtp.or(other.vtp),
         }
@@ -269,6 +272,33 @@ impl From<Diameter> for DiameterText {
         match diameter {
             Diameter::Metres(metres) => Self::Metres(metres),
             word => Self::Word(word.to_string()),
+        }
+    }
+}
+
+/// Whether light is followed after it was scattered.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Scatter {
+    /// However often it is.
+    #[default]
+    All,
+    /// Not at all: first order, direct light alone.
+    None,
+}
+
+impl FromStr for Scatter {
+    type Err = OptionFault;
+
+    fn from_str(text: &str) -> Result<Self, OptionFault> {
+        match text {
+            "all" => Ok(Self::All),
+            "none" => Ok(Self::None),
+            _ => Err(OptionFault {
+                option: "scatter",
+                expected: "all or none",
+                found: text.to_owned(),
+            }),
         }
     }
 }

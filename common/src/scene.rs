@@ -5,6 +5,7 @@ use std::sync::Arc;
 use crate::canopy::Canopy;
 use crate::light::Light;
 use crate::optics::Optics;
+use crate::sensors::Sensor;
 
 /// All that a solve needs to know of the world. Checked by whoever makes it (files, clients); every later stage
 /// relies on it: finite coordinates, physical optics for every material in every band, sources that travel down.
@@ -16,4 +17,6 @@ pub struct Scene {
     pub optics: Arc<Optics>,
     /// What comes from above.
     pub light: Arc<Light>,
+    /// Whose light is wanted besides.
+    pub sensors: Arc<[Sensor]>,
 }

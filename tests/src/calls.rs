@@ -98,6 +98,7 @@ pub async fn start(client: &mut Client, scene_id: &str, options: v1::SolveOption
     let request = v1::StartSolveRequest {
         scene_id: scene_id.to_owned(),
         options: Some(options),
+        sensors: None,
     };
     client
         .start_solve(request)

@@ -248,6 +248,7 @@ fn lit(dice: &mut Dice, canopy: Canopy) -> Scene {
         })
         .collect();
     Scene {
+        sensors: Arc::default(),
         canopy: Arc::new(canopy),
         optics: Arc::new(Optics { bands }),
         light: Arc::new(Light { suns, sky: None }),

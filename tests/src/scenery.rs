@@ -7,6 +7,7 @@ use nestrad_common::canopy::{Canopy, Material, Mesh, Organ, Pattern, Triangle};
 use nestrad_common::light::{Light, SkyLight, Source};
 use nestrad_common::optics::{Band, LeafOptics, Optics};
 use nestrad_common::scene::Scene;
+use nestrad_common::sensors::Sensor;
 use nestrad_kernel::elements::Elements;
 
 /// A scene in the making: surfaces first, then bands, then sources. All of it may be changed until a [`Scene`] is
@@ -29,6 +30,8 @@ pub struct Scenery {
     pub sources: Vec<Source>,
     /// A sky besides.
     pub sky: Option<SkyLight>,
+    /// In metres.
+    pub sensors: Vec<Sensor>,
 }
 
 impl Scenery {
@@ -168,6 +171,7 @@ impl Scenery {
                 suns: self.sources.clone(),
                 sky: self.sky.clone(),
             }),
+            sensors: self.sensors.clone().into(),
         }
     }
 }

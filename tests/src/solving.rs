@@ -115,6 +115,7 @@ pub fn lit<'a>(scene: &'a Scene, sources: &'a Sources) -> LitCanopy<'a> {
         canopy: &scene.canopy,
         optics: &scene.optics,
         sources,
+        sensors: &scene.sensors,
     }
 }
 

@@ -157,6 +157,7 @@ fn once_and_twice(scene: &Scene) -> [Scene; 2] {
         canopy,
         optics: optics.clone(),
         light: scene.light.clone(),
+        sensors: Arc::default(),
     })
 }
 

@@ -238,6 +238,7 @@ fn rms(case: &Case) -> f64 {
     let sources = Sources {
         list: scene.light.suns.clone(),
         sky_directions: 0,
+        sky: None,
     };
     let (mut square, mut n, mut far, mut error) = (0.0, 0.0, 0.0f64, 0.0);
     for seed in 1..=SEEDS {

@@ -51,6 +51,7 @@ fn framed(scene: &Scene) -> (Frame, Sources) {
     let sources = Sources {
         list: scene.light.suns.clone(),
         sky_directions: 0,
+        sky: None,
     };
     (frame(&scene.canopy, &plan.trace), sources)
 }

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use super::sensors::SensorFault;
 use crate::canopy::{MAX_NAME_BYTES, Organ};
 use crate::formats::pattern::MIN_SIDE;
 use crate::formats::{FormatError, MAX_COORDINATE, MAX_TRIANGLES, Place};
@@ -39,6 +40,9 @@ pub enum LoadError {
         /// What is wrong.
         fault: OpticsFault,
     },
+    /// A sensor cannot be.
+    #[error(transparent)]
+    Sensor(#[from] SensorFault),
     /// Nothing says what is to be computed.
     #[error("expected {expected}, found none")]
     Missing {

@@ -2,6 +2,7 @@
 
 use super::{
     BandOptics, LoadError, NO_SCENE, band_names, inspected, light as light_of, resolve_band,
+    sensors,
 };
 use crate::canopy::Canopy;
 use crate::formats::Origins;
@@ -9,6 +10,7 @@ use crate::inputs::{Inputs, LightInput};
 use crate::inspection::Inspection;
 use crate::light::Light;
 use crate::optics::Optics;
+use crate::sensors::Sensor;
 
 /// What there is, and what is wrong with the rest.
 #[derive(Debug, Default)]
@@ -22,6 +24,8 @@ pub struct Examined {
     /// The bands that the light is given for: those of the optics, or else of the light itself. A name is empty where
     /// nobody gave one.
     pub light_bands: Vec<String>,
+    /// Sensors, if they are good for the geometry.
+    pub sensors: Vec<Sensor>,
     /// Why [`load`](super::load) would refuse what is given.
     pub faults: Vec<LoadError>,
 }
@@ -42,6 +46,13 @@ pub fn examine(inputs: &Inputs) -> Examined {
     }
     if let Some(light) = &inputs.light {
         found.light(inputs, light);
+    }
+    if let Some((canopy, ..)) = &geometry {
+        let unit = inputs.unit.unwrap_or_default();
+        let placed = sensors::placed(&inputs.sensors, unit, canopy);
+        found.sensors = found
+            .good(placed.map_err(LoadError::from))
+            .unwrap_or_default();
     }
     found.canopy = geometry.map(|(canopy, _, mut inspection)| {
         if let Some(light) = &found.light {

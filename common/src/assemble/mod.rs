@@ -7,6 +7,7 @@ mod files;
 mod geometry;
 mod kinds;
 mod lights;
+mod sensors;
 mod species;
 #[cfg(test)]
 mod tests;
@@ -21,6 +22,7 @@ use crate::inspection::{Inspection, inspect};
 use crate::light::{Light, Source};
 use crate::optics::Optics;
 use crate::scene::Scene;
+use crate::sensors::Sensor;
 
 pub use bands::{BandOptics, resolve_band};
 pub use error::LoadError;
@@ -29,6 +31,7 @@ use files::name;
 pub use files::{is_scene_file, load_scene_file, load_weather};
 pub use geometry::{Geometry, build_canopy};
 pub use lights::{LightFile, merge_sources};
+pub use sensors::{SensorFault, check_sensor};
 
 /// A scene ready to be planned and solved.
 #[derive(Clone, Debug)]
@@ -46,6 +49,8 @@ pub struct Unlit {
     pub canopy: Arc<Canopy>,
     /// What its surfaces do with the light of each band.
     pub optics: Arc<Optics>,
+    /// Where light is to be measured.
+    pub sensors: Arc<[Sensor]>,
     /// What is in it and what is odd about it.
     pub inspection: Inspection,
 }
@@ -72,6 +77,7 @@ pub fn load(inputs: &Inputs) -> Result<Loaded, LoadError> {
             canopy: unlit.canopy,
             optics: unlit.optics,
             light: Arc::new(light),
+            sensors: unlit.sensors,
         },
         inspection,
     })
@@ -104,7 +110,9 @@ fn unlit<T>(
         .into_iter()
         .map(|optics| resolve_band(optics, &canopy, &origins))
         .collect::<Result<_, _>>()?;
+    let sensors = sensors::placed(&inputs.sensors, inputs.unit.unwrap_or_default(), &canopy)?;
     let unlit = Unlit {
+        sensors: sensors.into(),
         canopy: Arc::new(canopy),
         optics: Arc::new(Optics { bands }),
         inspection,

@@ -90,6 +90,8 @@ pub struct Sources {
     /// How many of them, from the first on, are directions that stand for a sky: another choice of directions
     /// would give another result.
     pub sky_directions: usize,
+    /// The sky that they stand for.
+    pub sky: Option<SkyLight>,
 }
 
 impl Light {
@@ -103,6 +105,7 @@ impl Light {
         Sources {
             list,
             sky_directions,
+            sky: self.sky.clone(),
         }
     }
 

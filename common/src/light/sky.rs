@@ -72,7 +72,18 @@ impl SkyLight {
         };
         parts.iter().map(source).collect()
     }
+
+    /// Radiance from a direction above the horizon, W m⁻² sr⁻¹, per band.
+    pub fn radiance_W_m2_sr(&self, towards: DVec3) -> Vec<f64> {
+        let parts = parts_of_sky(self.radiance, WELL_RESOLVED, 0);
+        let whole: f64 = parts.iter().map(|p| p.irradiance).sum();
+        let part = self.diffuse_fraction * self.radiance.towards(towards) / whole;
+        self.irradiance_W_m2.iter().map(|e| part * e).collect()
+    }
 }
+
+/// Directions that a sky is summed over where its sum alone is wanted.
+const WELL_RESOLVED: NonZeroUsize = NonZeroUsize::MIN.saturating_add(3999);
 
 impl Sky {
     /// The light of this sky and its sun, with so much on a horizontal plane above the canopy, W m⁻², per band.

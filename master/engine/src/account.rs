@@ -132,7 +132,7 @@ fn squared([a, b]: [f64; 2]) -> f64 {
 
 /// How the square of a sky's error goes with the number of directions: as its power -1.6 (see
 /// `light::sky::directions_for`).
-const TWICE_AS_MANY: f64 = 0.33;
+pub(crate) const TWICE_AS_MANY: f64 = 0.33;
 
 /// One per band; `plants` tells which organs are of plants, which alone count.
 pub fn organ_spread(plants: &[bool], solution: &Solution) -> Vec<OrganSpread> {

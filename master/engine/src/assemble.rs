@@ -1,6 +1,6 @@
 //! From irradiances of elements to light per organ and triangle, and the energy balance.
 
-use nestrad_common::optics::{Band, Optics};
+use nestrad_common::optics::{Band, LeafOptics, Optics};
 use nestrad_kernel::far_grid::Exit;
 
 use crate::direct::Direct;
@@ -50,6 +50,11 @@ impl Parts<'_> {
         }
         finish(&mut solution.organs, &solution.organ_area_m2, bands);
         finish(&mut solution.triangles, &solution.triangle_area_m2, bands);
+        let sunlit = self.direct.sunlit.iter().map(|sunlit| Estimate {
+            value: sunlit.area_m2,
+            se: sunlit.variance_m4.sqrt(),
+        });
+        solution.organ_sunlit_m2 = sunlit.collect();
         solution.soil = self.soil_map();
         solution.balance = (0..bands).map(|b| self.balance(b, &solution)).collect();
         solution
@@ -164,8 +169,17 @@ impl Parts<'_> {
         sinks[Sink::Up as usize] = up;
         sinks[Sink::Down as usize] = scattered_down + self.direct.passed_W[b];
         let incoming = self.direct.incoming_W[b] + self.outer_soil_W(b);
+        let scattered = match self.solved(b) {
+            Some(_) => Estimate::default(),
+            None => Estimate {
+                value: self.scattered_once_W(b),
+                se: self.direct.share_variances[b].scattered_W2.sqrt(),
+            },
+        };
         let missing = |left: f64, sink: Sink| left - sinks[sink as usize];
-        let closure = Sink::WHOLE.into_iter().fold(incoming, missing);
+        let closure = Sink::WHOLE
+            .into_iter()
+            .fold(incoming - scattered.value, missing);
         let none = Variances::default();
         let variances = self.variances(b).unwrap_or(&none);
         let estimate = |value: f64, variance: f64| Estimate {
@@ -212,6 +226,7 @@ impl Parts<'_> {
             absorbed_soil_W: of(Sink::Soil),
             escaped_up_W: of(Sink::Up),
             escaped_down_W: of(Sink::Down),
+            scattered_W: scattered,
             closure_W: estimate(
                 closure,
                 variances.closure_W2 + self.direct.closure_variance_W2[b],
@@ -228,6 +243,20 @@ impl Parts<'_> {
         let on_soil = rows.map(|row| self.frame.row_area_m2(row) * self.first_W_m2(row, b));
         items.map(|item| item.absorbed_direct_W).sum::<f64>()
             + (1.0 - self.optics.bands[b].soil_albedo) * on_soil.sum::<f64>()
+    }
+
+    /// What plants and soil scatter of uncollided light, W.
+    fn scattered_once_W(&self, b: usize) -> f64 {
+        let (frame, band) = (self.frame, &self.optics.bands[b]);
+        let of_elements = frame.triangle_of_element.iter().enumerate().map(|(e, &t)| {
+            let LeafOptics { upper, lower } = band.materials[frame.material[t as usize] as usize];
+            let [on_upper, on_lower] = [2 * e, 2 * e + 1].map(|row| self.first_W_m2(row, b));
+            frame.area_m2[e]
+                * ((upper.rho + upper.tau) * on_upper + (lower.rho + lower.tau) * on_lower)
+        });
+        let soil = frame.ends.faces() as usize..frame.rows();
+        let on_soil = soil.map(|row| frame.row_area_m2(row) * self.first_W_m2(row, b));
+        of_elements.sum::<f64>() + band.soil_albedo * on_soil.sum::<f64>()
     }
 
     /// Power that the soil beyond the map of an open scene sends to what is on it, W.

@@ -27,6 +27,7 @@ pub mod progress;
 pub mod resident;
 pub mod rounds;
 pub mod run;
+mod sensors;
 pub mod series;
 mod sinks;
 pub mod solution;

@@ -3,8 +3,9 @@
 use nestrad_common::canopy::Canopy;
 use nestrad_common::light::Sources;
 use nestrad_common::optics::Optics;
+use nestrad_common::sensors::Sensor;
 
-/// A canopy, its optics, and the parallel sources that its light is computed as.
+/// A canopy, its optics, the parallel sources that its light is computed as, and sensors.
 #[derive(Clone, Copy, Debug)]
 pub struct LitCanopy<'a> {
     /// The geometry.
@@ -13,4 +14,6 @@ pub struct LitCanopy<'a> {
     pub optics: &'a Optics,
     /// What shines on it.
     pub sources: &'a Sources,
+    /// Whose light is wanted besides.
+    pub sensors: &'a [Sensor],
 }

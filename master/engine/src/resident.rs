@@ -118,10 +118,10 @@ impl Resident {
                     }
         };
         if let Some(held) = self.held.as_ref().filter(|held| fits(held)) {
-            let (optics, sources) = (lit.optics, lit.sources);
+            let (optics, light) = (lit.optics, (lit.sources, lit.sensors));
             let lit = held
                 .traced
-                .lit_watched(optics, sources, &plan.light, run, watch);
+                .lit_watched(optics, light, &plan.light, run, watch);
             let (solution, mut work) = lit?;
             work.jobs = JobCounts {
                 traced: 0,

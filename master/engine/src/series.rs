@@ -65,6 +65,7 @@ impl Series {
             canopy: &self.scene.canopy,
             optics: &self.scene.optics,
             sources: &sources,
+            sensors: &self.scene.sensors,
         };
         let plan = Plan::of_traced(&lit, &self.settings, (&self.trace, &self.aims))?;
         let canopy = (&self.scene.canopy, &self.settings);

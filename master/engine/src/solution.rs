@@ -2,6 +2,7 @@
 
 use glam::DVec2;
 use nestrad_common::canopy::Kind;
+use nestrad_common::sensors::Sensor;
 use serde::{Deserialize, Serialize};
 
 use crate::frame::{Order, back};
@@ -28,6 +29,37 @@ pub struct ItemLight {
     pub absorbed_direct_W: f64,
     /// Standard error of `absorbed_W`, W.
     pub absorbed_se_W: f64,
+}
+
+/// What a sensor reads.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Reading {
+    /// The sensor, in metres relative to the scene's local origin.
+    pub sensor: Sensor,
+    /// One per band.
+    pub light: Vec<SensorLight>,
+}
+
+/// The light of a sensor in one band, W m⁻²; of radiance W m⁻² sr⁻¹.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SensorLight {
+    /// Straight from the sources.
+    pub direct: Estimate,
+    /// From what they light.
+    pub scattered: Estimate,
+    /// How far both together may be off besides their standard errors: by the size of elements and soil cells, by the
+    /// directions of a sky.
+    pub bias: f64,
+}
+
+impl SensorLight {
+    /// All of it.
+    pub fn total(&self) -> Estimate {
+        Estimate {
+            value: self.direct.value + self.scattered.value,
+            se: self.direct.se.hypot(self.scattered.se),
+        }
+    }
 }
 
 /// Irradiance of the soil plane on a regular grid of cells.
@@ -69,7 +101,11 @@ pub struct Balance {
     pub escaped_up_W: Estimate,
     /// Leaves downwards into the void where there is no soil.
     pub escaped_down_W: Estimate,
-    /// `incoming - absorbed - escaped`: what the estimate does not account for.
+    /// Scattered where it first met something, and not followed: all that was scattered in a band that was not solved
+    /// for, nothing in others.
+    #[serde(default)]
+    pub scattered_W: Estimate,
+    /// `incoming - absorbed - escaped - scattered`: what the estimate does not account for.
     pub closure_W: Estimate,
     /// Absorbed by the triangles of each material, in the scene's order.
     #[serde(default)]
@@ -158,8 +194,13 @@ pub struct Solution {
     pub organ_area_m2: Vec<f64>,
     /// One-sided area of each triangle, m².
     pub triangle_area_m2: Vec<f64>,
+    /// One-sided area of each organ that the sun reaches on either side, m²: of the sources that are not directions of a
+    /// sky, the strongest. Empty without a sun.
+    pub organ_sunlit_m2: Vec<Estimate>,
     /// Where there is a soil plane.
     pub soil: Option<SoilMap>,
+    /// What sensors read, in their order.
+    pub readings: Vec<Reading>,
     /// One per band.
     pub balance: Vec<Balance>,
     /// What the error of organs comes from, for each band in which something is absorbed.
@@ -178,6 +219,7 @@ impl Solution {
             balance,
             organs: back(&self.organs, &order.organ, bands),
             organ_bias_W: back(&self.organ_bias_W, &order.organ, bands),
+            organ_sunlit_m2: back(&self.organ_sunlit_m2, &order.organ, 1),
             organ_area_m2: back(&self.organ_area_m2, &order.organ, 1),
             triangles: back(&self.triangles, &order.triangle, bands),
             triangle_area_m2: back(&self.triangle_area_m2, &order.triangle, 1),

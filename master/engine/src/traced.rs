@@ -11,6 +11,7 @@ use std::thread;
 use nestrad_common::canopy::Canopy;
 use nestrad_common::light::Sources;
 use nestrad_common::optics::Optics;
+use nestrad_common::sensors::Sensor;
 use nestrad_kernel::rows::Counts;
 use serde::Serialize;
 
@@ -28,6 +29,7 @@ use crate::outer_soil;
 use crate::plan::{LightPlan, Plan, TracePlan};
 use crate::progress::Progress;
 use crate::run::Run;
+use crate::sensors::Surroundings;
 use crate::solution::Solution;
 pub use crate::solve_error::{FailureKind, SolveError};
 use crate::solver::{FarSample, Groups, Irradiance, Sampled, System, solve as solve_system};
@@ -180,19 +182,19 @@ impl TracedCanopy {
         plan: &LightPlan,
         run: &Run,
     ) -> Result<(Solution, WorkDone), SolveError> {
-        self.lit_watched(optics, sources, plan, run, &mut Stopwatch::start())
+        self.lit_watched(optics, (sources, &[]), plan, run, &mut Stopwatch::start())
     }
 
-    /// The same, watched.
+    /// The same with sensors, watched.
     pub(crate) fn lit_watched(
         &self,
         optics: &Optics,
-        sources: &Sources,
+        (sources, sensors): (&Sources, &[Sensor]),
         plan: &LightPlan,
         run: &Run,
         watch: &mut Stopwatch,
     ) -> Result<(Solution, WorkDone), SolveError> {
-        let light = FramedLight::of(&self.frame, optics, sources, plan);
+        let light = FramedLight::of(&self.frame, optics, (sources, sensors), plan);
         let direct = light.direct(&self.frame, &self.directions, run, watch)?;
         self.solve(&light, &direct, run, watch)
     }
@@ -282,8 +284,22 @@ impl TracedCanopy {
             jobs: exchange.map_or_else(JobCounts::default, |e| e.jobs),
             passes: irradiance.passes,
         };
+        let surroundings = Surroundings {
+            frame,
+            optics,
+            sources: light.sources,
+            direct,
+            irradiance: &irradiance,
+            scattering: &plan.scattering_bands,
+            groups: self.scattering.as_ref().map(|s| &s.groups),
+            outlook: &outlook,
+            outer_soil_W_m2: &outer_soil_W_m2,
+            seed: plan.seed,
+        };
+        let readings = surroundings.readings(light.sensors, run)?;
         drop(irradiance);
-        let solution = solution.in_order_of(&frame.order);
+        let mut solution = solution.in_order_of(&frame.order);
+        solution.readings = readings;
         check_balance(&solution)?;
         watch.lap("results");
         run.progress.finish();
@@ -295,14 +311,21 @@ impl TracedCanopy {
 struct FramedLight<'a> {
     optics: Optics,
     sources: &'a Sources,
+    sensors: &'a [Sensor],
     plan: &'a LightPlan,
 }
 
 impl<'a> FramedLight<'a> {
-    fn of(frame: &Frame, optics: &Optics, sources: &'a Sources, plan: &'a LightPlan) -> Self {
+    fn of(
+        frame: &Frame,
+        optics: &Optics,
+        (sources, sensors): (&'a Sources, &'a [Sensor]),
+        plan: &'a LightPlan,
+    ) -> Self {
         Self {
             optics: frame.ordered(optics),
             sources,
+            sensors,
             plan,
         }
     }
@@ -354,7 +377,7 @@ pub(crate) fn solve_and_keep(
     let frame = Frame::new(lit.canopy, &plan.trace.cut())?;
     watch.lap("elements");
     run.stop.check()?;
-    let light = FramedLight::of(&frame, lit.optics, lit.sources, &plan.light);
+    let light = FramedLight::of(&frame, lit.optics, (lit.sources, lit.sensors), &plan.light);
     let direct = |frame: &Frame, run: &Run, watch: &mut Stopwatch| {
         light.direct(frame, &directions, run, watch)
     };

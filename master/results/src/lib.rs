@@ -23,6 +23,7 @@ mod json;
 mod number;
 mod parquet;
 pub mod report;
+mod sensors;
 pub mod series;
 pub mod summary;
 mod table;

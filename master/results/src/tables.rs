@@ -18,6 +18,8 @@ pub(crate) fn organs<'a>(
     let organ = move |row: usize| &canopy.organs[row / count];
     let kinds = canopy.organ_kinds();
     let light = move |row: usize| &solution.organs[row];
+    // none without a sun
+    let sunlit = move |row: usize| solution.organ_sunlit_m2.get(row / count);
     Table {
         name: "organs",
         rows: canopy.organs.len() * count,
@@ -40,6 +42,11 @@ pub(crate) fn organs<'a>(
             Column::quantity("absorbed_direct_W", move |row| light(row).absorbed_direct_W),
             Column::quantity("absorbed_se_W", move |row| light(row).absorbed_se_W),
             Column::quantity("absorbed_bias_W", move |row| solution.organ_bias_W[row]),
+            Column::sparse("sunlit_area_m2", move |row| Some(sunlit(row)?.value)),
+            Column::sparse("shaded_area_m2", move |row| {
+                Some((solution.organ_area_m2[row / count] - sunlit(row)?.value).max(0.0))
+            }),
+            Column::sparse("sunlit_area_se_m2", move |row| Some(sunlit(row)?.se)),
         ],
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! One line per band: what comes in and where it goes, each with its standard error, per m² of
 //! ground where there is a pattern and for the whole scene where there is none. Columns of what a
-//! scene does not have (structures, soil, a void below) are left out. Five significant digits of the light
+//! scene does not have (structures, soil, a void below, scattered light that is not followed) are left out. Five significant digits of the light
 //! that comes in are shown, or fewer where the table would not fit into 80 columns. A second table says what
 //! each material absorbs, where there are several.
 
@@ -43,10 +43,11 @@ fn flows(balance: &[Balance]) -> Vec<Flow> {
         ("plants", |b| b.absorbed_plants_W),
         ("escaped up", |b| b.escaped_up_W),
     ];
-    let only_where_there_is_some: [Flow; 3] = [
+    let only_where_there_is_some: [Flow; 4] = [
         ("structures", |b| b.absorbed_structures_W),
         ("soil", |b| b.absorbed_soil_W),
         ("escaped down", |b| b.escaped_down_W),
+        ("scattered", |b| b.scattered_W),
     ];
     let [plants, escaped_up] = always;
     let mut flows = vec![plants];

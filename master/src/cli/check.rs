@@ -1,5 +1,7 @@
 //! `nestrad check`: what is in a scene and what is wrong with it. Nothing is computed.
 
+use std::sync::Arc;
+
 use anyhow::Result;
 use clap::Args;
 use glam::DVec3;
@@ -12,6 +14,7 @@ use nestrad_common::optics::{Band, FaceOptics, LeafOptics, Optics};
 use nestrad_common::options::Options;
 use nestrad_common::printable;
 use nestrad_common::scene::Scene;
+use nestrad_common::sensors::Sensor;
 use nestrad_engine::plan::Estimator;
 use nestrad_engine::rounds::first_plan;
 
@@ -37,6 +40,7 @@ impl CheckArgs {
             optics,
             light,
             light_bands,
+            sensors,
             faults,
         } = examine(&inputs);
         let mut facts = Facts::default();
@@ -53,7 +57,8 @@ impl CheckArgs {
             None if inputs.light.is_none() => facts.line("light", "none is given; solve needs it"),
             None => {}
         }
-        if let Some((_, inspection)) = &canopy {
+        if let Some((canopy, inspection)) = &canopy {
+            facts.sensors(&sensors, canopy.origin_m);
             facts.warnings(inspection);
             console::print(facts.0.as_bytes())?;
         }
@@ -100,6 +105,7 @@ fn complete(canopy: Canopy, optics: Option<Optics>, light: Option<Light>) -> Sce
         canopy: canopy.into(),
         optics: optics.into(),
         light: light.into(),
+        sensors: Arc::default(),
     }
 }
 
@@ -214,6 +220,41 @@ impl Facts {
                 let range = format!("{lowest:.2} to {highest:.2} degrees above the horizon");
                 self.line("sources", &range);
             }
+        }
+    }
+
+    /// Those of a name that follow one another, in one line.
+    fn sensors(&mut self, sensors: &[Sensor], origin_m: DVec3) {
+        for named in sensors.chunk_by(|a, b| a.name == b.name) {
+            let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+            let mut sides: Vec<&str> = Vec::new();
+            for sensor in named {
+                for corner in sensor.shape.corners_m() {
+                    (low, high) = (low.min(corner), high.max(corner));
+                }
+                if !sides.contains(&sensor.side()) {
+                    sides.push(sensor.side());
+                }
+            }
+            let [low, high] = [low + origin_m, high + origin_m].map(|p| p.to_array());
+            let ranges = ["x", "y", "z"].into_iter().zip(low.into_iter().zip(high));
+            let ranges = ranges.map(|(axis, (low, high))| {
+                let [low, high] = [low, high].map(|x| fixed(x, 3));
+                if low == high {
+                    format!("{axis} {low}")
+                } else {
+                    format!("{axis} {low} to {high}")
+                }
+            });
+            let text = format!(
+                "{}: {} readings ({}) at {} m, {} rays each",
+                named[0].name,
+                named.len(),
+                sides.join(", "),
+                ranges.collect::<Vec<_>>().join(", "),
+                named[0].rays
+            );
+            self.line("sensor", &text);
         }
     }
 

@@ -168,6 +168,7 @@ impl CanopyFlags {
             soil: self.soil,
             // said in a scene file alone
             kinds: KindsInput::default(),
+            sensors: Vec::new(),
             bands: bands.collect(),
             light,
             band_fraction,

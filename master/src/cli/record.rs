@@ -4,7 +4,7 @@ use std::path::Path;
 
 use nestrad_common::inputs::{Inputs, LightInput, PatternInput};
 use nestrad_common::light::{CieType, Light, Sky, SunnySky};
-use nestrad_common::options::{Diameter, TableFormat, Unit, Up};
+use nestrad_common::options::{Diameter, Scatter, TableFormat, Unit, Up};
 use nestrad_engine::plan::{Estimator, Settings};
 use serde::Serialize;
 
@@ -30,6 +30,7 @@ pub(crate) struct OptionsRecord {
     master: Option<String>,
     seed: u64,
     estimator: Estimator,
+    scatter: Scatter,
     format: TableFormat,
     vtp: bool,
 }
@@ -84,6 +85,7 @@ impl OptionsRecord {
             master: master.map(str::to_owned),
             seed: settings.seed,
             estimator: settings.estimator,
+            scatter: settings.scatter,
             format: options.format.unwrap_or_default(),
             vtp: options.vtp.unwrap_or(false),
         }

@@ -14,5 +14,6 @@ pub(super) fn settings(options: &Options, budget_s: Option<f64>, estimator: Esti
         memory_GiB: options.memory_GiB.unwrap_or(default.memory_GiB),
         seed: options.seed.unwrap_or(default.seed),
         estimator,
+        scatter: options.scatter.unwrap_or(default.scatter),
     }
 }

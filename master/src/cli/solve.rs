@@ -9,7 +9,7 @@ use nestrad_cluster::with_rows;
 use nestrad_common::assemble::{self, Loaded};
 use nestrad_common::inputs::Inputs;
 use nestrad_common::inspection::Inspection;
-use nestrad_common::options::{Diameter, Options, TableFormat};
+use nestrad_common::options::{Diameter, Options, Scatter, TableFormat};
 use nestrad_common::scene::Scene;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::plan::{Estimator, Plan, Settings};
@@ -37,8 +37,8 @@ use super::workers::{Crew, WorkersFlags};
 
 /// Compute the light that every organ, triangle and soil cell of a canopy gets
 ///
-/// Writes organs.csv, triangles.csv, soil.csv (where there is a soil plane) and summary.json into DIR; after an
-/// error DIR is unchanged. The plan goes to stderr, a table of the energy balance to stdout.
+/// Writes organs.csv, triangles.csv, soil.csv (where there is a soil plane), sensors.csv and radiance.csv (where the scene
+/// file has [[sensors]]) and summary.json into DIR; after an error DIR is unchanged. The plan goes to stderr, a table of the energy balance to stdout.
 ///
 /// Exit codes: 0 success; 1 input that cannot be used; 2 wrong flags; 3 results were written, but a fault kept them
 /// from the asked accuracy; 4 a limit (memory, time, size, queue) does not allow it; 5 the master cannot be reached,
@@ -109,6 +109,11 @@ struct HowFlags {
     /// How light between leaves is sampled
     #[arg(long, value_enum, value_name = "HOW", default_value_t = EstimatorFlag::Lines)]
     estimator: EstimatorFlag,
+
+    /// Whether light is followed after it was scattered: all, or none (first order: direct light alone, no exchange is
+    /// traced, and the balance states what is scattered) [default: all]
+    #[arg(long, value_name = "all|none")]
+    scatter: Option<Scatter>,
 }
 
 #[derive(Debug, Args)]
@@ -157,6 +162,7 @@ impl SolveArgs {
             memory_GiB: how.memory,
             threads: how.threads,
             seed: how.seed,
+            scatter: how.scatter,
             format: results.format,
             vtp: results.vtp.then_some(true),
         }

@@ -96,7 +96,9 @@ impl HowFlags {
         let seed = inputs.options.seed.unwrap_or(default.seed);
         // before the work, not after it
         check_place(&self.out)?;
-        let loaded = assemble::load(inputs)?;
+        let mut loaded = assemble::load(inputs)?;
+        // a study is of organs
+        loaded.scene.sensors = Arc::default();
         for warning in &loaded.inspection.warnings {
             notes.say("warning", warning);
         }

@@ -18,13 +18,14 @@ const SCENE: [&str; 13] = [
     "--up <AXIS>",
 ];
 
-const SOLVE: [&str; 12] = [
+const SOLVE: [&str; 13] = [
     "--diameter <auto|inf|METRES>",
     "--accuracy <PERCENT>",
     "--memory <GIB>",
     "--threads <N>",
     "--seed <N>",
     "--estimator <HOW>",
+    "--scatter <all|none>",
     "--out <DIR>",
     "--format <FORM>",
     "--vtp",

@@ -155,6 +155,7 @@ fn what_is_not_there_is_named() {
         let request = v1::StartSolveRequest {
             scene_id: id.to_owned(),
             options: None,
+            sensors: None,
         };
         let status = client.start_solve(request).await.unwrap_err();
         assert_eq!(status.code(), Code::NotFound);

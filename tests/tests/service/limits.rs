@@ -37,6 +37,7 @@ fn scenes_are_bounded_before_they_arrive_and_old_ones_go_first() {
         let request = v1::StartSolveRequest {
             scene_id: first.unwrap(),
             options: None,
+            sensors: None,
         };
         let status = client.start_solve(request).await.unwrap_err();
         assert_eq!(status.code(), Code::NotFound);
@@ -106,6 +107,7 @@ fn memory_of_a_solve_and_the_queue_are_bounded() {
         let request = v1::StartSolveRequest {
             scene_id: scene,
             options: None,
+            sensors: None,
         };
         let status = client.start_solve(request).await.unwrap_err();
         assert_eq!(status.code(), Code::ResourceExhausted);

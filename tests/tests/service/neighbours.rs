@@ -28,6 +28,7 @@ async fn try_to_start(client: &mut Client, scene_id: &str) -> Result<String, Sta
     let request = v1::StartSolveRequest {
         scene_id: scene_id.to_owned(),
         options: None,
+        sensors: None,
     };
     let started = client.start_solve(request).await?;
     Ok(started.into_inner().solve_id)

@@ -30,6 +30,8 @@ pub enum Purpose {
     FarField = 4,
     /// Rotation of a built-in sky.
     Sky = 5,
+    /// Rays from sensors.
+    Sensors = 6,
 }
 
 /// A direction of lines, and its share of the hemisphere relative to the mean of its set.

@@ -2,6 +2,7 @@
 
 mod light;
 mod organs;
+mod sensors;
 
 use std::fs;
 use std::path::PathBuf;

@@ -8,11 +8,11 @@ use toml::Spanned;
 
 use super::super::error::FormatError;
 use super::super::pattern::{Rectangle, refused};
-use super::Text;
 use super::tables::{
     BandTable, FaceTable, KindsTable, LightTable, LightText, MaterialTable, OneOrMany, PatternText,
     SceneFile, SkyTable, TimeText,
 };
+use super::{Text, sensors};
 use crate::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
 use crate::light::photons::flat_spectrum_umol_J;
 use crate::light::{SKY_NAMES, Sky, SkyModel, SunnySky};
@@ -56,6 +56,7 @@ pub(super) fn inputs(
         bands: bands.collect::<Result<_, _>>()?,
         light,
         band_fraction,
+        sensors: sensors::inputs(file.sensors, text)?,
         options: file.options.map(Spanned::into_inner).unwrap_or_default(),
     })
 }

@@ -32,10 +32,12 @@
 //! `[light.sky]` with `irradiance_W_m2 = { PAR = 400.0, NIR = 380.0 }` and `kind = "uniform_overcast"` or
 //! `"standard_overcast"`; or, with the keys `time_utc`, `latitude_deg`, `longitude_deg` and `diffuse_fraction`, `"clear"`,
 //! `"cie_1"` to `"cie_15"` or `"perez"`, which also needs `ghi_W_m2`. For weather (`nestrad series`, `nestrad day`) `[light.band_fraction]` says which
-//! part of broadband irradiance a band gets: `PAR = 0.48`. Paths are relative to the scene file.
+//! part of broadband irradiance a band gets: `PAR = 0.48`. `[[sensors]]` say where light is to be measured besides
+//! (`sensors.rs`). Paths are relative to the scene file.
 
 mod checks;
 mod hints;
+mod sensors;
 mod tables;
 #[cfg(test)]
 mod tests;

@@ -10,6 +10,7 @@ use serde::de::{self, Deserializer, MapAccess, Visitor};
 use toml::Spanned;
 
 use crate::canopy::Kind;
+use crate::inputs::Sides;
 use crate::options::{Options, Unit, Up};
 
 #[derive(Deserialize)]
@@ -24,6 +25,8 @@ pub(super) struct SceneFile {
     #[serde(default)]
     pub(super) bands: Vec<Spanned<BandTable>>,
     pub(super) light: Option<Spanned<LightText>>,
+    #[serde(default)]
+    pub(super) sensors: Vec<Spanned<SensorTable>>,
     #[serde(default)]
     pub(super) options: Option<Spanned<Options>>,
 }
@@ -130,6 +133,28 @@ pub(super) struct SkyTable {
     pub(super) longitude_deg: Option<f64>,
     pub(super) diffuse_fraction: Option<f64>,
     pub(super) ghi_W_m2: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct SensorTable {
+    pub(super) name: String,
+    pub(super) points: Option<Vec<[f64; 3]>>,
+    pub(super) patch: Option<Vec<[f64; 3]>>,
+    pub(super) grid: Option<GridTable>,
+    pub(super) spheres: Option<Vec<[f64; 3]>>,
+    pub(super) normal: Option<[f64; 3]>,
+    pub(super) sides: Option<Sides>,
+    pub(super) radiance_from: Option<Vec<[f64; 3]>>,
+    pub(super) rays: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+pub(super) struct GridTable {
+    pub(super) corners: [f64; 4],
+    pub(super) cells: [u32; 2],
+    pub(super) heights: Vec<f64>,
 }
 
 /// TOML has dates of its own; quotes around one are as good.

@@ -4,7 +4,7 @@ use super::*;
 use crate::inputs::{LightInput, PatternInput};
 use crate::light::{CieType, Sky, SunnySky};
 use crate::optics::LeafOptics;
-use crate::options::{Diameter, TableFormat, Unit, Up};
+use crate::options::{Diameter, Scatter, TableFormat, Unit, Up};
 
 const WHOLE: &str = r#"
 scene = ["maize.can.gz", "/abs/soil.obj"]
@@ -31,6 +31,7 @@ accuracy_percent = 0.5
 memory_GiB = 2
 threads = 2
 seed = 7
+scatter = "none"
 format = "parquet"
 vtp = true
 "#;
@@ -69,6 +70,7 @@ fn everything_can_be_said() {
     assert_eq!(options.accuracy_percent, Some(0.5));
     assert_eq!(options.memory_GiB, Some(2.0));
     assert_eq!((options.threads, options.seed), (Some(2), Some(7)));
+    assert_eq!(options.scatter, Some(Scatter::None));
     assert_eq!(options.format, Some(TableFormat::Parquet));
     assert_eq!(options.vtp, Some(true));
 }

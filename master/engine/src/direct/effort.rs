@@ -140,6 +140,7 @@ mod tests {
                 irradiance_W_m2: vec![1.0],
             }],
             sky_directions: 0,
+            sky: None,
         };
         for (leaf_area_m2, finest_m2) in [(1e4, 1e-6), (1e4, 1e-8), (5.0, 1e-6)] {
             let area = spread_effort(&sources, &extent, finest_m2, (1.0, leaf_area_m2))[0];

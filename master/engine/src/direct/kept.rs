@@ -39,6 +39,8 @@ struct Key {
     seed: u64,
     /// Small organs are probed with rays.
     probed: bool,
+    /// See [`Projection`].
+    is_sun: bool,
 }
 
 #[derive(Debug)]
@@ -92,6 +94,7 @@ impl KeptDirections {
             line_area: projection.line_area_m2.to_bits(),
             seed,
             probed,
+            is_sun: projection.is_sun,
         };
         {
             let mut kept = self.lock();
@@ -176,6 +179,7 @@ mod tests {
             towards: DVec3::Z,
             line_area_m2: 1.0,
             random: [0.0; 4],
+            is_sun: false,
         };
         let mut found = false;
         kept.lit_areas(&projection, 1, false, || {

@@ -7,6 +7,7 @@ use nestrad_kernel::zbuffer::ZBuffer;
 use super::classes::Classes;
 use super::outlines::{Outline, Outlines};
 use super::shadow::Shade;
+use super::sunlit::SunlitArea;
 use crate::frame::Frame;
 
 /// What a direction lights.
@@ -35,6 +36,8 @@ pub(super) struct LitAreas {
     /// Of all organs that are probed, perpendicular to the source: area, what is lit of it, and what the lattice
     /// shows of it, m².
     pub(super) probed_m2: Option<[f64; 3]>,
+    /// Of each organ, if this is the sun.
+    pub(super) sunlit: Vec<SunlitArea>,
 }
 
 /// A face that is lit. There are as many as a canopy has, for each direction that is kept: they are small.
@@ -110,6 +113,7 @@ impl LitAreas {
             + of(self.outlines.capacity(), size_of::<Outline>())
             + of(self.scene.capacity(), size_of::<Outline>())
             + of(self.unsure.capacity(), size_of::<Unsure>())
+            + of(self.sunlit.capacity(), size_of::<SunlitArea>())
     }
 
     /// Without room that is not used.
@@ -120,6 +124,7 @@ impl LitAreas {
         self.outlines.shrink_to_fit();
         self.scene.shrink_to_fit();
         self.unsure.shrink_to_fit();
+        self.sunlit.shrink_to_fit();
     }
 }
 

@@ -21,6 +21,7 @@ mod projection;
 mod shadow;
 mod shares;
 mod sky;
+mod sunlit;
 mod systematic;
 mod tally;
 
@@ -35,6 +36,7 @@ use rayon::prelude::*;
 pub use effort::spread_effort;
 pub use kept::KeptDirections;
 pub use shares::ShareVariances;
+pub use sunlit::SunlitArea;
 
 use crate::frame::Frame;
 use crate::stop::Stopped;
@@ -72,6 +74,8 @@ pub struct Direct {
     /// What every other direction of a sky, and the others, would make organs absorb if they stood for all of
     /// it, W, indexed `organ * bands + band`; empty without such a sky.
     pub sky_halves_W: [Vec<f64>; 2],
+    /// What the sun reaches of each organ: see [`SunlitArea`]. Empty without a sun.
+    pub sunlit: Vec<SunlitArea>,
 }
 
 /// Sources are worked off in this many groups, an even number, each in order, which are then added in order: so the
@@ -110,6 +114,7 @@ pub fn direct_light_keeping(
     let tracer = kept.tracer().unwrap_or(&of_this_light);
     let probe = Probe::new((&sources.list, line_area_m2), thin, (tracer, seed));
     kept.next_light();
+    let sun = sunlit::sun_of(sources);
     let parts: Result<Vec<Direct>, Stopped> = groups(sources)
         .into_par_iter()
         .map(|group| {
@@ -127,12 +132,14 @@ pub fn direct_light_keeping(
                         towards: -source.direction,
                         line_area_m2: line_area_m2[k],
                         random: rng.random(),
+                        is_sun: sun == Some(k),
                     };
                     let lit = kept.lit_areas(&projection, seed, probe.serves(k), || {
                         projection.lit_areas(frame, (&areas, &classes), &probe, &mut scratch)
                     });
                     part.add(frame, optics, &lit, source);
                     coloured.add(frame, &lit, source);
+                    part.sunlit.extend_from_slice(&lit.sunlit);
                 }
                 coloured.pour(frame, optics, &mut part);
             }
@@ -156,6 +163,7 @@ pub fn direct_light_keeping(
         }
         add(&mut sum.passed_W, &part.passed_W);
         sum.lines += part.lines;
+        sum.sunlit.extend_from_slice(&part.sunlit);
     }
     let of_sky = &parts[..GROUPS.min(sources.sky_directions)];
     let of_sky: Vec<&[f64]> = of_sky.iter().map(|p| &p.irradiance_W_m2[..]).collect();
@@ -187,6 +195,7 @@ impl Direct {
             passed_W: vec![0.0; bands],
             lines: 0,
             sky_halves_W: Default::default(),
+            sunlit: Vec::new(),
         }
     }
 

@@ -13,6 +13,7 @@ use super::lit_areas::{LitAreas, LitCell, Scratch};
 use super::outlines::Looking;
 use super::probe::{Probe, Thin};
 use super::shadow::Shadow;
+use super::sunlit;
 use crate::frame::Frame;
 
 /// How a direction is projected.
@@ -26,6 +27,8 @@ pub(super) struct Projection {
     pub(super) line_area_m2: f64,
     /// See [`Lattice::stretched`].
     pub(super) random: [f64; 4],
+    /// Whether to tell what it reaches of each organ.
+    pub(super) is_sun: bool,
 }
 
 impl Projection {
@@ -118,6 +121,9 @@ impl Projection {
             beam.probe(probe, &thin, scratch, &mut lit);
         }
         beam.deal_out(&thin, scratch, &mut lit);
+        if self.is_sun {
+            lit.sunlit = sunlit::of_organs(&beam, &thin, scratch, &lit);
+        }
         lit.soil = under.lit_cells(&lattice, &scratch.visible);
         if let Some((shadow, (outer, soil))) = shadow.zip(outer) {
             lit.shades = shadow.on(&outer, &lattice, soil.z_m);

@@ -19,7 +19,7 @@ use std::sync::Arc;
 
 use nestrad_common::canopy::Canopy;
 use nestrad_common::light::Sources;
-use nestrad_common::options::{DEFAULT_MEMORY_GIB, Diameter};
+use nestrad_common::options::{DEFAULT_MEMORY_GIB, Diameter, Scatter};
 use nestrad_kernel::elements::Elements;
 use nestrad_kernel::far_grid::{Levels, SharedFarGrid};
 use nestrad_kernel::lattice::Extent;
@@ -58,6 +58,8 @@ pub struct Settings {
     pub seed: u64,
     /// How the exchange is sampled.
     pub estimator: Estimator,
+    /// Whether light is followed after it was scattered.
+    pub scatter: Scatter,
 }
 
 /// How the exchange is sampled.
@@ -80,6 +82,7 @@ impl Default for Settings {
             memory_GiB: DEFAULT_MEMORY_GIB,
             seed: 1,
             estimator: Estimator::default(),
+            scatter: Scatter::default(),
         }
     }
 }
@@ -117,7 +120,7 @@ pub struct TracePlan {
     pub radius_m: Option<f64>,
     /// The far field; `None` where nothing is far.
     pub far_field: Option<FarPlan>,
-    /// Sampling of the exchange; `None` when nothing scatters.
+    /// Sampling of the exchange; `None` when nothing scatters, or what is scattered is not followed.
     pub sampling: Option<Sampling>,
     /// Whether memory allows no direct light while rows are traced elsewhere.
     #[serde(skip)]
@@ -143,7 +146,7 @@ pub struct LightPlan {
     pub direct_line_area_m2: f64,
     /// Start of the random numbers of the direct light.
     pub seed: u64,
-    /// Numbers of the bands in which something scatters.
+    /// Numbers of the bands in which something scatters that is followed.
     pub scattering_bands: Vec<usize>,
     /// When the solver stops.
     pub tolerance: Tolerance,
@@ -202,6 +205,7 @@ impl Plan {
             canopy,
             optics,
             sources,
+            ..
         } = *lit;
         limits::check_accuracy(aims.exchange_percent.min(aims.direct_percent))?;
         limits::check_overhang(canopy)?;
@@ -209,9 +213,11 @@ impl Plan {
         limits::check_pattern(canopy, &scale)?;
         let has_soil = canopy.soil_z_m.is_some();
         let is_lit = |b: usize| sources.list.iter().any(|s| s.irradiance_W_m2[b] > 0.0);
-        let scattering_bands: Vec<usize> = (0..optics.len())
-            .filter(|&b| is_lit(b) && !optics.bands[b].is_black(has_soil))
-            .collect();
+        let scatters = |&b: &usize| is_lit(b) && !optics.bands[b].is_black(has_soil);
+        let scattering_bands: Vec<usize> = match settings.scatter {
+            Scatter::All => (0..optics.len()).filter(scatters).collect(),
+            Scatter::None => Vec::new(),
+        };
         let organ_m = scale.organ_m();
         let edge_m = elements::edge_m(&scale);
         let coarser = aims.coarser_elements();

@@ -2,7 +2,7 @@
 
 use nestrad_common::canopy::{Canopy, Kind};
 use nestrad_common::inspection::SunFacts;
-use nestrad_common::options::Diameter;
+use nestrad_common::options::{Diameter, Scatter};
 
 use super::{Estimator, Plan, Settings};
 use crate::lit_canopy::LitCanopy;
@@ -11,11 +11,12 @@ use crate::lit_canopy::LitCanopy;
 pub(super) fn of(lit: &LitCanopy, settings: &Settings, plan: &Plan) -> Vec<String> {
     let mut lines = vec![light(lit, plan)];
     lines.extend(sun(lit));
-    lines.push(bands(lit, plan));
+    lines.push(bands(lit, settings, plan));
     lines.push(exchange(settings, plan));
     lines.push(field(lit.canopy, settings, plan));
     lines.push(faces(lit.canopy));
     lines.push(soil(lit.canopy, plan));
+    lines.extend(sensors(lit));
     lines.push(format!(
         "memory: about {:.2} GiB (program {:.2}, scene {:.2}, rows {:.2}, solver {:.2}) of {} GiB allowed",
         plan.memory.total_GiB(),
@@ -64,7 +65,13 @@ fn sun(lit: &LitCanopy) -> Option<String> {
     SunFacts::of(suns).map(|sun| format!("sun: {sun}"))
 }
 
-fn bands(lit: &LitCanopy, plan: &Plan) -> String {
+fn bands(lit: &LitCanopy, settings: &Settings, plan: &Plan) -> String {
+    if settings.scatter == Scatter::None {
+        return format!(
+            "bands: {}: direct light only; what is scattered is not followed (--scatter none)",
+            lit.optics.names().join(", ")
+        );
+    }
     let names = |scatters: bool| -> Vec<&str> {
         (0..lit.optics.len())
             .filter(|b| plan.light.scattering_bands.contains(b) == scatters)
@@ -90,6 +97,9 @@ fn bands(lit: &LitCanopy, plan: &Plan) -> String {
 }
 
 fn exchange(settings: &Settings, plan: &Plan) -> String {
+    if settings.scatter == Scatter::None {
+        return "exchange: none, because scattered light is not followed".to_owned();
+    }
     let Some(s) = &plan.trace.sampling else {
         return "exchange: none, because nothing scatters".to_owned();
     };
@@ -143,6 +153,21 @@ fn faces(canopy: &Canopy) -> String {
         "faces: two for each of {} triangles; {solid} of them enclose solids, and parts of leaves inside a solid are dark",
         canopy.len()
     )
+}
+
+/// What is read after each solve.
+fn sensors(lit: &LitCanopy) -> Option<String> {
+    let rays: u64 = lit
+        .sensors
+        .iter()
+        .map(|sensor| u64::from(sensor.rays))
+        .sum();
+    let count = lit.sensors.len();
+    (count > 0).then(|| {
+        format!(
+            "sensors: {count}, by {rays} rays for scattered light and one or more to each source"
+        )
+    })
 }
 
 fn soil(canopy: &Canopy, plan: &Plan) -> String {

@@ -345,5 +345,6 @@ fn lit_canopy<'a>(scene: &'a Scene, sources: &'a Sources) -> LitCanopy<'a> {
         canopy: &scene.canopy,
         optics: &scene.optics,
         sources,
+        sensors: &scene.sensors,
     }
 }

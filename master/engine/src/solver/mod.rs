@@ -19,6 +19,7 @@ mod gather;
 mod groups;
 mod krylov;
 mod lane;
+mod larger;
 mod pass;
 mod prefetch;
 mod soil_groups;

@@ -10,7 +10,7 @@ use crate::atomic::{Staging, check_writable};
 use crate::error::OutputError;
 use crate::summary::Summary;
 use crate::table::Table;
-use crate::{csv, parquet, tables, vtp};
+use crate::{csv, parquet, sensors, tables, vtp};
 
 /// Which files a result has.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,13 +28,17 @@ pub(crate) const REPORT: &str = "report.html";
 
 /// All that a run may write, of a solve or a series: what is not part of a result is removed from an earlier one's folder,
 /// so that a folder never shows two results at once.
-pub(crate) const ALL_FILES: [&str; 19] = [
+pub(crate) const ALL_FILES: [&str; 23] = [
     "organs.csv",
     "organs.parquet",
     "triangles.csv",
     "triangles.parquet",
     "soil.csv",
     "soil.parquet",
+    "sensors.csv",
+    "sensors.parquet",
+    "radiance.csv",
+    "radiance.parquet",
     SURFACE,
     // of a series
     "series.csv",
@@ -82,7 +86,8 @@ pub fn stage(
         Some(tables::triangles(canopy, band_names, solution)),
         soil.map(|map| tables::soil(canopy, band_names, map)),
     ];
-    for table in tables.iter().flatten() {
+    let of_sensors = sensors::tables(canopy.origin_m, band_names, &solution.readings);
+    for table in tables.iter().flatten().chain(&of_sensors) {
         write_table(&mut staging, table, formats.table)?;
     }
     if formats.vtp {
@@ -132,6 +137,16 @@ fn check_counts(canopy: &Canopy, bands: usize, solution: &Solution) -> Result<()
     let soil = solution.soil.as_ref();
     let soil_cells = soil.map_or(0, |map| map.nx * map.ny);
     let soil_values = soil.map_or(0, |map| map.irradiance_W_m2.len());
+    let mut lights = solution.readings.iter().map(|reading| reading.light.len());
+    if let Some(found) = lights.find(|&found| found != bands) {
+        return Err(OutputError::Mismatch {
+            what: "bands of a sensor",
+            expected: bands,
+            found,
+        });
+    }
+    let has_sun = !solution.organ_sunlit_m2.is_empty();
+    let sunlit_organs = if has_sun { organs } else { 0 };
     let of_triangles = canopy.triangles().map(|triangle| triangle.organ);
     for (what, expected, found) in [
         ("organ values", organs * bands, solution.organs.len()),
@@ -143,6 +158,11 @@ fn check_counts(canopy: &Canopy, bands: usize, solution: &Solution) -> Result<()
         ),
         ("organ areas", organs, solution.organ_area_m2.len()),
         ("triangle areas", triangles, solution.triangle_area_m2.len()),
+        (
+            "sunlit areas",
+            sunlit_organs,
+            solution.organ_sunlit_m2.len(),
+        ),
         ("soil values", soil_cells * bands, soil_values),
     ] {
         if expected != found {

@@ -4,7 +4,8 @@ use std::fs;
 
 use glam::{DVec2, DVec3};
 use nestrad_common::canopy::{Kind, Material, Mesh, Organ, Pattern, Triangle};
-use nestrad_engine::solution::{Estimate, ItemLight, SoilMap};
+use nestrad_common::sensors::{Receives, Sensor, Shape};
+use nestrad_engine::solution::{Estimate, ItemLight, Reading, SensorLight, SoilMap};
 
 use super::*;
 
@@ -63,6 +64,10 @@ fn solution() -> Solution {
         triangles: vec![light(1.0), light(0.1), light(1.0), light(1.0)],
         organ_bias_W: vec![0.0, 0.0, 0.25, 0.0],
         organ_area_m2: vec![0.0, 0.625],
+        organ_sunlit_m2: [(0.0, 0.0), (0.5, 0.01)]
+            .map(|(value, se)| Estimate { value, se })
+            .into(),
+        readings: readings(),
         triangle_area_m2: vec![0.625, 0.0],
         soil: Some(SoilMap {
             min_m: DVec2::new(0.0, -1.0),
@@ -78,6 +83,43 @@ fn solution() -> Solution {
         }),
         ..Solution::default()
     }
+}
+
+/// The lower side of a cell of a grid, a sphere, and what it sees from a side.
+fn readings() -> Vec<Reading> {
+    let light = |scale: f64| SensorLight {
+        direct: Estimate {
+            value: 10.0 * scale,
+            se: 3.0 * scale,
+        },
+        scattered: Estimate {
+            value: 20.0 * scale,
+            se: 4.0 * scale,
+        },
+        bias: 0.5 * scale,
+    };
+    let cell = Shape::Parallelogram(DVec3::new(0.0, 0.0, 0.5), [2.0 * DVec3::X, 2.0 * DVec3::Y]);
+    let bud = Shape::Point(DVec3::Z);
+    let lower = Receives::Side {
+        facing: -DVec3::Z,
+        lower: true,
+    };
+    let reading = |(name, shape, receives): (&str, Shape, Receives)| Reading {
+        sensor: Sensor {
+            name: name.to_owned(),
+            shape,
+            receives,
+            rays: 64,
+        },
+        light: vec![light(1.0), light(0.1)],
+    };
+    [
+        ("floor", cell, lower),
+        ("bud", bud, Receives::Everywhere),
+        ("bud", bud, Receives::From(DVec3::X)),
+    ]
+    .map(reading)
+    .into()
 }
 
 fn summary() -> Summary<'static> {
@@ -126,15 +168,38 @@ fn tables_byte_for_byte() {
     let read = |name: &str| fs::read_to_string(out.join(name)).expect("a file");
     assert_eq!(
         names(&out),
-        ["organs.csv", "soil.csv", "summary.json", "triangles.csv"]
+        [
+            "organs.csv",
+            "radiance.csv",
+            "sensors.csv",
+            "soil.csv",
+            "summary.json",
+            "triangles.csv"
+        ]
     );
     assert_eq!(
         read("organs.csv"),
-        r#"species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W
-3,2,"leaf 1, ""flag""",structure,0.0,PAR,0.0,0.0,0.0,0.0,0.0,0.0
-3,2,"leaf 1, ""flag""",structure,0.0,NIR,0.0,0.0,0.0,0.0,0.0,0.0
-3,1,1001,leaf,0.625,PAR,300.0,20.0,33.3333333,30.0,0.125,0.25
-3,1,1001,leaf,0.625,NIR,30.0,2.0,3.33333333,3.0,0.0125,0.0
+        r#"species,plant,organ,kind,area_m2,band,irradiance_upper_W_m2,irradiance_lower_W_m2,absorbed_W,absorbed_direct_W,absorbed_se_W,absorbed_bias_W,sunlit_area_m2,shaded_area_m2,sunlit_area_se_m2
+3,2,"leaf 1, ""flag""",structure,0.0,PAR,0.0,0.0,0.0,0.0,0.0,0.0,0.0,0.0,0.0
+3,2,"leaf 1, ""flag""",structure,0.0,NIR,0.0,0.0,0.0,0.0,0.0,0.0,0.0,0.0,0.0
+3,1,1001,leaf,0.625,PAR,300.0,20.0,33.3333333,30.0,0.125,0.25,0.5,0.125,0.01
+3,1,1001,leaf,0.625,NIR,30.0,2.0,3.33333333,3.0,0.0125,0.0,0.5,0.125,0.01
+"#
+    );
+    assert_eq!(
+        read("sensors.csv"),
+        r#"name,x_m,y_m,z_m,side,band,irradiance_direct_W_m2,irradiance_scattered_W_m2,irradiance_W_m2,irradiance_direct_se_W_m2,irradiance_scattered_se_W_m2,irradiance_se_W_m2,irradiance_bias_W_m2
+floor,500001.25,101.0,-0.5,lower,PAR,10.0,20.0,30.0,3.0,4.0,5.0,0.5
+floor,500001.25,101.0,-0.5,lower,NIR,1.0,2.0,3.0,0.3,0.4,0.5,0.05
+bud,500000.25,100.0,0.0,sphere,PAR,10.0,20.0,30.0,3.0,4.0,5.0,0.5
+bud,500000.25,100.0,0.0,sphere,NIR,1.0,2.0,3.0,0.3,0.4,0.5,0.05
+"#
+    );
+    assert_eq!(
+        read("radiance.csv"),
+        r#"name,x_m,y_m,z_m,from_x,from_y,from_z,band,radiance_sky_W_m2_sr,radiance_scattered_W_m2_sr,radiance_W_m2_sr,radiance_se_W_m2_sr,radiance_bias_W_m2_sr
+bud,500000.25,100.0,0.0,1.0,0.0,0.0,PAR,10.0,20.0,30.0,5.0,0.5
+bud,500000.25,100.0,0.0,1.0,0.0,0.0,NIR,1.0,2.0,3.0,0.5,0.05
 "#
     );
     assert_eq!(
@@ -164,6 +229,7 @@ fn another_format_replaces_all_of_an_earlier_result() {
     write_all(dir.path(), &canopy(), &BANDS, &solution(), CSV, &summary()).expect("written");
     let mut bare = solution();
     bare.soil = None;
+    bare.readings.clear();
     write_all(
         dir.path(),
         &canopy(),
@@ -189,6 +255,7 @@ fn another_format_replaces_all_of_an_earlier_result() {
 fn a_bad_number_leaves_the_earlier_result_alone() {
     let dir = tempfile::tempdir().expect("a folder");
     write_all(dir.path(), &canopy(), &BANDS, &solution(), CSV, &summary()).expect("written");
+    let all = names(dir.path());
     let before = fs::read(dir.path().join("organs.csv")).expect("a file");
     let mut bad = solution();
     bad.organs[3].absorbed_W = 5.0;
@@ -204,10 +271,7 @@ fn a_bad_number_leaves_the_earlier_result_alone() {
             fault.to_string(),
             "absorbed_W_m2 in row 1 is NaN, not a finite number"
         );
-        assert_eq!(
-            names(dir.path()),
-            ["organs.csv", "soil.csv", "summary.json", "triangles.csv"]
-        );
+        assert_eq!(names(dir.path()), all);
         assert_eq!(
             fs::read(dir.path().join("organs.csv")).expect("a file"),
             before
@@ -248,6 +312,8 @@ fn a_solution_of_another_canopy_is_refused() {
     );
     refused(|_, solution| solution.organ_area_m2.clear());
     refused(|_, solution| solution.organ_bias_W.clear());
+    refused(|_, solution| solution.organ_sunlit_m2.truncate(1));
+    refused(|_, solution| solution.readings[1].light.clear());
     refused(|_, solution| solution.soil.iter_mut().for_each(|soil| soil.nx = 3));
     assert!(names(dir.path()).is_empty());
 }

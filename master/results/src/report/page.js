@@ -118,7 +118,8 @@ function showProfiles() {
 function showBalance() {
   const flows = [['absorbed by plants', 'absorbed_plants_W'], ['… by leaves', 'absorbed_leaves_W'], ['… by stems', 'absorbed_stems_W'],
     ['absorbed by structures', 'absorbed_structures_W'], ['absorbed by the soil', 'absorbed_soil_W'],
-    ['escaped upwards', 'escaped_up_W'], ['escaped downwards', 'escaped_down_W'], ['closure', 'closure_W']];
+    ['escaped upwards', 'escaped_up_W'], ['escaped downwards', 'escaped_down_W'],
+    ['scattered, not followed', 'scattered_W'], ['closure', 'closure_W']];
   // where the canopy repeats, per ground; a scene that stands alone, as a whole
   const divisor = report.periodic ? ground : 1;
   const part = (value, of) => (of > 0 ? ` <span class="se">(${fixed(100 * value / of, 2)} %)</span>` : '');

@@ -52,6 +52,8 @@ pub struct BandSum {
     pub absorbed_soil_J: f64,
     /// Left upwards or downwards.
     pub escaped_J: f64,
+    /// Scattered and not followed.
+    pub scattered_J: f64,
     /// What is not accounted for.
     pub closure_J: f64,
 }

@@ -182,6 +182,7 @@ fn balance<'a>(result: &'a SeriesResult<'a>) -> Table<'a> {
             flow("absorbed_soil_W", |b| b.absorbed_soil_W.value),
             flow("escaped_up_W", |b| b.escaped_up_W.value),
             flow("escaped_down_W", |b| b.escaped_down_W.value),
+            flow("scattered_W", |b| b.scattered_W.value),
             flow("closure_W", |b| b.closure_W.value),
             flow("closure_se_W", |b| b.closure_W.se),
             Column::sparse("error_percent", move |row| step(row)?.facts.error_percent),

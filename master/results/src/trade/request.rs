@@ -107,6 +107,7 @@ impl Request<'_> {
             canopy: &scene.canopy,
             optics: &scene.optics,
             sources: &scene.light.sources(aims.sky_directions(), seed),
+            sensors: &[],
         };
         let plan = setting.turned(&lit, aims, self.memory_GiB, seed)?;
         let (solution, work) = traced::solve(&lit, &plan, &ThisProcess::default(), run, watch)?;

@@ -8,13 +8,14 @@
 mod error;
 mod on_the_way;
 mod results;
+mod sensors;
 mod setback;
 mod solved;
 mod upload;
 
 use std::time::{Duration, Instant};
 
-use nestrad_common::options::Diameter;
+use nestrad_common::options::{Diameter, Scatter};
 use nestrad_common::scene::Scene;
 use nestrad_engine::plan::{DEFAULT_ACCURACY_PERCENT, Estimator, Settings};
 use nestrad_engine::progress::StageProgress;
@@ -115,6 +116,10 @@ fn options(settings: &Settings) -> v1::SolveOptions {
         Estimator::Lines => v1::Estimator::Lines,
         Estimator::Rays => v1::Estimator::Rays,
     };
+    let scatter = match settings.scatter {
+        Scatter::All => v1::Scatter::All,
+        Scatter::None => v1::Scatter::None,
+    };
     v1::SolveOptions {
         diameter_m: match settings.diameter {
             Diameter::Auto => None,
@@ -128,6 +133,7 @@ fn options(settings: &Settings) -> v1::SolveOptions {
         seed: Some(settings.seed),
         estimator: estimator.into(),
         budget_s: settings.budget_s,
+        scatter: scatter.into(),
     }
 }
 
@@ -292,6 +298,7 @@ impl Session {
         let request = v1::StartSolveRequest {
             scene_id,
             options: Some(self.options),
+            sensors: sensors::list(&self.scene.sensors),
         };
         let answer = timeout(ANSWER, self.master.start_solve(request)).await;
         let response = self.answered("start the solve", answer)?;
@@ -355,12 +362,18 @@ impl Session {
         let doing = "give out the results";
         let scene = self.scene.clone();
         let mut arriving = Arriving::new(&scene);
-        for table in [
+        let tables = [
             v1::ResultTable::Organs,
             v1::ResultTable::Triangles,
             v1::ResultTable::Soil,
+            v1::ResultTable::Sensors,
             v1::ResultTable::Summary,
-        ] {
+        ];
+        // a master of an earlier version knows no sensors
+        let wanted = |table: &v1::ResultTable| {
+            *table != v1::ResultTable::Sensors || !scene.sensors.is_empty()
+        };
+        for table in tables.into_iter().filter(wanted) {
             let request = v1::FetchResultsRequest {
                 solve_id: id.to_owned(),
                 table: table.into(),

@@ -6,7 +6,9 @@ use nestrad_common::canopy::Canopy;
 use nestrad_common::scene::Scene;
 use nestrad_engine::exchange::JobCounts;
 use nestrad_engine::rounds::Accuracy;
-use nestrad_engine::solution::{Balance, Estimate, ItemLight, MaterialLight, SoilMap, Solution};
+use nestrad_engine::solution::{
+    Balance, Estimate, ItemLight, MaterialLight, Reading, SensorLight, SoilMap, Solution,
+};
 use nestrad_engine::stopwatch::{Stage, Usage};
 use nestrad_engine::traced::WorkDone;
 use nestrad_kernel::rows::Counts;
@@ -47,6 +49,17 @@ impl<'a> Arriving<'a> {
                     return Err(RemoteError::Answer("organs that do not fit the scene"));
                 }
                 solution.organ_bias_W.extend(slice.absorbed_bias_w);
+                let sunlit = &mut solution.organ_sunlit_m2;
+                let (values, errors) = (slice.sunlit_area_m2, slice.sunlit_area_se_m2);
+                // empty without a sun
+                let none = values.is_empty() && sunlit.is_empty();
+                let known = sunlit.len() == solution.organ_area_m2.len();
+                let fits = known && values.len() == slice.area_m2.len();
+                if values.len() != errors.len() || !(none || fits) {
+                    return Err(RemoteError::Answer("organs that do not fit the scene"));
+                }
+                let both = values.into_iter().zip(errors);
+                sunlit.extend(both.map(|(value, se)| Estimate { value, se }));
                 append(
                     "organs",
                     (slice.first, self.scene.canopy.organs.len()),
@@ -66,6 +79,7 @@ impl<'a> Arriving<'a> {
                 )
             }
             Some(Part::Soil(slice)) => self.soil(slice),
+            Some(Part::Sensors(slice)) => self.readings(slice),
             Some(Part::Summary(summary)) => {
                 let canopy = &self.scene.canopy;
                 let bands = summary.bands.iter().map(|band| balance(band, canopy));
@@ -106,6 +120,48 @@ impl<'a> Arriving<'a> {
         Ok(())
     }
 
+    fn readings(&mut self, slice: v1::SensorReadings) -> Result<(), RemoteError> {
+        let bands = self.scene.optics.len();
+        let readings = &mut self.solution.readings;
+        let columns = [
+            &slice.direct_w_m2,
+            &slice.direct_se_w_m2,
+            &slice.scattered_w_m2,
+            &slice.scattered_se_w_m2,
+            &slice.bias_w_m2,
+        ];
+        let count = columns[0].len();
+        let rest = &self.scene.sensors[readings.len().min(self.scene.sensors.len())..];
+        let fits = slice.first == readings.len() as u64
+            && count.is_multiple_of(bands.max(1))
+            && count / bands.max(1) <= rest.len()
+            && columns.iter().all(|column| column.len() == count);
+        if !fits {
+            return Err(RemoteError::Answer("sensors that do not fit the scene"));
+        }
+        let light = |k: usize| {
+            let [direct, direct_se, scattered, scattered_se, bias] =
+                columns.map(|column| column[k]);
+            SensorLight {
+                direct: Estimate {
+                    value: direct,
+                    se: direct_se,
+                },
+                scattered: Estimate {
+                    value: scattered,
+                    se: scattered_se,
+                },
+                bias,
+            }
+        };
+        let read = (0..count / bands.max(1)).zip(rest);
+        readings.extend(read.map(|(number, sensor)| Reading {
+            sensor: sensor.clone(),
+            light: (number * bands..(number + 1) * bands).map(light).collect(),
+        }));
+        Ok(())
+    }
+
     /// All of it.
     pub(super) fn finish(mut self) -> Result<SolvedThere, RemoteError> {
         let (canopy, solution) = (&self.scene.canopy, &mut self.solution);
@@ -114,6 +170,7 @@ impl<'a> Arriving<'a> {
         let complete = solution.organs.len() == canopy.organs.len() * bands
             && solution.triangles.len() == canopy.len() * bands
             && solution.balance.len() == bands
+            && solution.readings.len() == self.scene.sensors.len()
             && soil.is_none_or(|map| map.irradiance_W_m2.len() == map.nx * map.ny * bands);
         let Some(summary) = self.summary.filter(|_| complete) else {
             return Err(RemoteError::Answer("results that are not complete"));
@@ -230,6 +287,7 @@ fn balance(band: &v1::BandSummary, canopy: &Canopy) -> Result<Balance, RemoteErr
         absorbed_soil_W: estimate(band.absorbed_soil_w),
         escaped_up_W: estimate(band.escaped_up_w),
         escaped_down_W: estimate(band.escaped_down_w),
+        scattered_W: estimate(band.scattered_w),
         closure_W: estimate(band.closure_w),
         materials: materials.collect(),
     })

@@ -157,6 +157,7 @@ mod tests {
             irradiance_W_m2: vec![100.0],
         };
         Scene {
+            sensors: Arc::default(),
             canopy: Arc::new(canopy),
             optics: Arc::new(Optics { bands: vec![band] }),
             light: Arc::new(Light {

@@ -18,7 +18,7 @@ use super::caller::Caller;
 use super::error::{ErrorCode, ServiceError};
 use super::held::HeldCanopy;
 use super::identity::Id;
-use super::intake::{Upload, lighting, organ_bytes, settings, triangle_bytes};
+use super::intake::{Upload, lighting, organ_bytes, sensors, settings, triangle_bytes};
 use super::metrics::Metrics;
 use super::residents::Residents;
 use super::scenes::Scenes;
@@ -113,7 +113,8 @@ impl SolveService for Rpc {
         let request = request.into_inner();
         let settings = settings(&request.options.unwrap_or_default(), self.most_GiB)?;
         let scene = self.scenes.scene(parse(&request.scene_id, "scene_id")?)?;
-        let solve = self.solves.start(caller, scene, settings)?;
+        let sensors = sensors(request.sensors, &scene.geometry().canopy)?;
+        let solve = self.solves.start(caller, scene.with(sensors), settings)?;
         Ok(Response::new(v1::StartSolveResponse {
             solve_id: solve.id.to_string(),
         }))

@@ -6,6 +6,7 @@ use std::sync::{Arc, Mutex, MutexGuard};
 use std::time::Duration;
 
 use nestrad_common::scene::Scene;
+use nestrad_common::sensors::Sensor;
 
 use super::budget::{Budget, Reservation};
 use super::caller::Caller;
@@ -37,6 +38,8 @@ pub(super) struct HeldScene {
     pub(super) id: Id,
     geometry: Arc<Counted<HeldCanopy>>,
     lighting: Arc<Counted<Lighting>>,
+    /// Of one solve.
+    sensors: Arc<[Sensor]>,
 }
 
 impl HeldScene {
@@ -58,7 +61,17 @@ impl HeldScene {
             canopy: self.geometry().canopy.clone(),
             optics: self.lighting().optics.clone(),
             light: self.lighting().light.clone(),
+            sensors: self.sensors.clone(),
         }
+    }
+
+    pub(super) fn sensors(&self) -> &[Sensor] {
+        &self.sensors
+    }
+
+    /// The same with sensors.
+    pub(super) fn with(self, sensors: Arc<[Sensor]>) -> Self {
+        Self { sensors, ..self }
     }
 }
 
@@ -164,6 +177,7 @@ impl Scenes {
                 item: lighting,
                 memory,
             }),
+            sensors: Arc::default(),
         };
         while held.scenes.len() >= MAX_SCENES && !held.scenes.contains_key(&scene.id) {
             held.evict_one_of_many(caller);

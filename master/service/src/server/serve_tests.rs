@@ -124,6 +124,7 @@ async fn a_thread_that_solves_and_dies_is_said_and_its_solves_fail_with_a_reason
     let request = v1::StartSolveRequest {
         scene_id,
         options: None,
+        sensors: None,
     };
     // one that is computed, and one that waits or comes too late
     let first = client

@@ -7,7 +7,7 @@ use v1::result_slice::Part;
 
 use super::error::{ErrorCode, ServiceError};
 use super::solution::HeldSolution;
-use nestrad_engine::solution::{ItemLight, SoilMap};
+use nestrad_engine::solution::{ItemLight, SensorLight, SoilMap};
 
 /// Bytes of an item's numbers in each band, as they travel.
 const LIGHT_BYTES: usize = 5 * 8;
@@ -41,11 +41,16 @@ pub(super) fn of(
                 Some(slice(Part::Soil(soil_cells(&outcome, map, a, b))))
             }))
         }
+        v1::ResultTable::Sensors => {
+            let readings = outcome.solution.readings.len();
+            let parts = parts(readings, LIGHT_BYTES * outcome.bands.len());
+            Box::new(parts.map(move |(a, b)| slice(Part::Sensors(readings_of(&outcome, a, b)))))
+        }
         v1::ResultTable::Summary => Box::new(std::iter::once(slice(Part::Summary(
             outcome.summary.clone(),
         )))),
         v1::ResultTable::Unspecified => {
-            let message = "table: expected organs, triangles, soil or summary";
+            let message = "table: expected organs, triangles, soil, sensors or summary";
             return Err(ServiceError::new(ErrorCode::Invalid, message));
         }
     })
@@ -63,7 +68,7 @@ fn parts(items: usize, item_bytes: usize) -> impl Iterator<Item = (usize, usize)
 fn end_of_organs(outcome: &HeldSolution, from: usize) -> usize {
     let mut bytes = 0;
     let fits = |organ: &&nestrad_common::canopy::Organ| {
-        bytes += (LIGHT_BYTES + 8) * outcome.bands.len() + 16 + 4;
+        bytes += (LIGHT_BYTES + 8) * outcome.bands.len() + 16 + 16 + 4;
         bytes += organ.id.len() + organ.plant.len() + organ.species.len();
         bytes <= SLICE_BYTES
     };
@@ -74,6 +79,8 @@ fn end_of_organs(outcome: &HeldSolution, from: usize) -> usize {
 fn organs(outcome: &HeldSolution, from: usize, to: usize) -> v1::OrganLight {
     let bands = outcome.bands.len();
     let organs = &outcome.organs[from..to];
+    let sunlit = outcome.solution.organ_sunlit_m2.get(from..to);
+    let sunlit = sunlit.unwrap_or_default();
     v1::OrganLight {
         first: from as u64,
         bands: outcome.bands.clone(),
@@ -83,6 +90,8 @@ fn organs(outcome: &HeldSolution, from: usize, to: usize) -> v1::OrganLight {
         area_m2: outcome.solution.organ_area_m2[from..to].to_vec(),
         light: light(&outcome.solution.organs[from * bands..to * bands]),
         absorbed_bias_w: outcome.solution.organ_bias_W[from * bands..to * bands].to_vec(),
+        sunlit_area_m2: sunlit.iter().map(|area| area.value).collect(),
+        sunlit_area_se_m2: sunlit.iter().map(|area| area.se).collect(),
     }
 }
 
@@ -94,6 +103,23 @@ fn triangles(outcome: &HeldSolution, from: usize, to: usize) -> v1::TriangleLigh
         organ: outcome.organ[from..to].to_vec(),
         area_m2: outcome.solution.triangle_area_m2[from..to].to_vec(),
         light: light(&outcome.solution.triangles[from * bands..to * bands]),
+    }
+}
+
+fn readings_of(outcome: &HeldSolution, from: usize, to: usize) -> v1::SensorReadings {
+    let readings = &outcome.solution.readings[from..to];
+    let column = |of: fn(&SensorLight) -> f64| {
+        let lights = readings.iter().flat_map(|reading| &reading.light);
+        lights.map(of).collect()
+    };
+    v1::SensorReadings {
+        first: from as u64,
+        bands: outcome.bands.clone(),
+        direct_w_m2: column(|light| light.direct.value),
+        direct_se_w_m2: column(|light| light.direct.se),
+        scattered_w_m2: column(|light| light.scattered.value),
+        scattered_se_w_m2: column(|light| light.scattered.se),
+        bias_w_m2: column(|light| light.bias),
     }
 }
 

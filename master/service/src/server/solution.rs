@@ -1,9 +1,12 @@
 //! What came of a solve, as long as it is kept.
 
 use nestrad_common::canopy::Organ;
+use nestrad_common::sensors::Sensor;
 use nestrad_engine::account::organ_spread;
 use nestrad_engine::rounds::Solved;
-use nestrad_engine::solution::{Estimate, ItemLight, MaterialLight, Solution};
+use nestrad_engine::solution::{
+    Estimate, ItemLight, MaterialLight, Reading, SensorLight, Solution,
+};
 use nestrad_engine::stopwatch::{Stage, Usage};
 use nestrad_proto::v1;
 
@@ -51,6 +54,7 @@ impl HeldSolution {
             escaped_up_w: quantity(balance.escaped_up_W),
             escaped_down_w: quantity(balance.escaped_down_W),
             closure_w: quantity(balance.closure_W),
+            scattered_w: quantity(balance.scattered_W),
             organ_error_percent: error.rms_percent,
             materials: balance.materials.iter().map(material).collect(),
         });
@@ -95,7 +99,8 @@ impl HeldSolution {
         let canopy = &scene.geometry().canopy;
         let bands = scene.lighting().optics.len();
         let names: usize = canopy.organs.iter().map(name_bytes).sum();
-        bytes(canopy.len(), canopy.organs.len(), 0, bands) + names as u64
+        let readings = reading_bytes(scene.sensors().iter(), bands);
+        bytes(canopy.len(), canopy.organs.len(), 0, bands) + names as u64 + readings
     }
 
     /// Bytes that these results take.
@@ -104,15 +109,23 @@ impl HeldSolution {
         let cells = soil.map_or(0, |map| map.nx * map.ny);
         let names: usize = self.organs.iter().map(name_bytes).sum();
         let (triangles, organs) = (self.organ.len(), self.organs.len());
-        bytes(triangles, organs, cells, self.bands.len()) + names as u64
+        let readings = self.solution.readings.iter().map(|reading| &reading.sensor);
+        let readings = reading_bytes(readings, self.bands.len());
+        bytes(triangles, organs, cells, self.bands.len()) + names as u64 + readings
     }
 }
 
 fn bytes(triangles: usize, organs: usize, cells: usize, bands: usize) -> u64 {
     let light = bands * size_of::<ItemLight>();
     let of_triangles = triangles * (light + 12);
-    let of_organs = organs * (light + 8 * (bands + 1) + size_of::<Organ>());
+    let of_organs = organs * (light + 8 * (bands + 3) + size_of::<Organ>());
     (of_triangles + of_organs + cells * bands * size_of::<Estimate>() + (4 << 10)) as u64
+}
+
+fn reading_bytes<'a>(sensors: impl Iterator<Item = &'a Sensor>, bands: usize) -> u64 {
+    let of_bands = bands * size_of::<SensorLight>();
+    let bytes = sensors.map(|sensor| size_of::<Reading>() + sensor.name.len() + of_bands);
+    bytes.sum::<usize>() as u64
 }
 
 fn name_bytes(organ: &Organ) -> usize {

@@ -96,12 +96,13 @@ struct Tables {
     organs: bool,
     triangles: bool,
     soil: bool,
+    sensors: bool,
     summary: bool,
 }
 
 impl Tables {
     fn any(self) -> bool {
-        self.organs || self.triangles || self.soil || self.summary
+        self.organs || self.triangles || self.soil || self.sensors || self.summary
     }
 }
 
@@ -207,6 +208,7 @@ impl Solve {
             v1::ResultTable::Organs => tables.organs = true,
             v1::ResultTable::Triangles => tables.triangles = true,
             v1::ResultTable::Soil => tables.soil = true,
+            v1::ResultTable::Sensors => tables.sensors = true,
             v1::ResultTable::Summary => tables.summary = true,
             v1::ResultTable::Unspecified => {}
         }
@@ -234,7 +236,8 @@ impl Solve {
         match &*self.phase.borrow() {
             Phase::Finished(outcome) => {
                 let soil = tables.soil || outcome.solution.soil.is_none();
-                let all = tables.organs && tables.triangles && soil;
+                let sensors = tables.sensors || outcome.solution.readings.is_empty();
+                let all = tables.organs && tables.triangles && soil && sensors;
                 // whoever fetches the summary last has fetched all that he wants
                 in_time(!(tables.summary || all))
             }

@@ -191,6 +191,7 @@ fn carry_out(
         memory_GiB: how.memory,
         threads: how.threads,
         seed: how.seed,
+        scatter: None,
         format: how.format,
         vtp: None,
     };
@@ -205,6 +206,10 @@ fn carry_out(
         sky: site.sky,
         out: how.out,
     };
+    if !task.inputs.sensors.is_empty() {
+        let line = "sensors are for `nestrad solve`: a series does not read them";
+        task.notes.say("warning", line);
+    }
     pool(task.inputs.options.threads, task.notes)?.install(|| task.carry_out())
 }
 

@@ -22,6 +22,7 @@ pub(super) fn sums(result: &SeriesResult<'_>) -> Vec<BandSum> {
             absorbed_plants_J: over(|b| b.absorbed_plants_W.value),
             absorbed_soil_J: over(|b| b.absorbed_soil_W.value),
             escaped_J: over(|b| b.escaped_up_W.value + b.escaped_down_W.value),
+            scattered_J: over(|b| b.scattered_W.value),
             closure_J: over(|b| b.closure_W.value),
         }
     };

@@ -125,6 +125,7 @@ impl Task {
             canopy: unlit.canopy.clone(),
             optics: unlit.optics.clone(),
             light: Arc::new(reference.light.clone().unwrap_or_default()),
+            sensors: Arc::default(),
         };
         let begins = |plan: &Plan, before: &[Round]| self.begins(plan, before);
         let begun = Series::begin(scene, settings, &rows, &run, &mut watch, begins);

@@ -196,6 +196,7 @@ async fn start(client: &mut Client, dice: &mut Dice) -> Result<String, Status> {
     let scene_id = client.upload_scene(slices).await?.into_inner().scene_id;
     let request = v1::StartSolveRequest {
         scene_id,
+        sensors: None,
         options: Some(v1::SolveOptions {
             memory_gi_b: Some(crate::bounds::SOLVE_GIB),
             ..v1::SolveOptions::default()

@@ -60,6 +60,19 @@ impl Tracer {
         self.seen_within(block, &ray, 0.0, f64::INFINITY) == block.local(block.ends.sky())
     }
 
+    /// The end that a ray from a point in the open meets first, however far away that is; points of a face are to lie
+    /// a hair in front of it. The block is a whole scene.
+    pub fn met(&self, block: &Block, origin: DVec3, direction: DVec3) -> u32 {
+        let ray = FaceRay {
+            // it leaves nothing that has a face
+            face: block.local(block.ends.sky()),
+            origin,
+            direction,
+            source: None,
+        };
+        block.number_of(self.seen_within(block, &ray, 0.0, f64::INFINITY))
+    }
+
     /// The local end that a ray from triangle `source` meets first.
     ///
     /// `random` in [0, 1) chooses between far ends around a point.

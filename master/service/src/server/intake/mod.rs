@@ -3,6 +3,7 @@
 
 mod checks;
 mod options;
+mod sensors;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -23,6 +24,7 @@ use super::held::HeldCanopy;
 use super::identity::GeometryHasher;
 pub(super) use checks::lighting;
 pub(super) use options::settings;
+pub(super) use sensors::sensors;
 pub(super) use surface::{Surface, sent};
 
 /// Bytes that a triangle takes while it is held, and an organ without its text.

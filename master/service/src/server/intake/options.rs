@@ -1,6 +1,6 @@
 //! How a client wants its solve.
 
-use nestrad_common::options::{self, DIAMETERS, Diameter};
+use nestrad_common::options::{self, DIAMETERS, Diameter, Scatter};
 use nestrad_proto::v1;
 
 use super::ServiceError;
@@ -45,6 +45,17 @@ pub(in crate::server) fn settings(
             ));
         }
     };
+    let scatter = match v1::Scatter::try_from(given.scatter) {
+        Ok(v1::Scatter::All) => Scatter::All,
+        Ok(v1::Scatter::None) => Scatter::None,
+        Err(_) => {
+            return Err(ServiceError::invalid(
+                "options.scatter",
+                "all or none",
+                given.scatter,
+            ));
+        }
+    };
     let accuracy = given.accuracy_percent;
     Ok(Settings {
         diameter,
@@ -60,5 +71,6 @@ pub(in crate::server) fn settings(
         memory_GiB,
         seed: given.seed.unwrap_or(default.seed),
         estimator,
+        scatter,
     })
 }

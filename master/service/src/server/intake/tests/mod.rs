@@ -2,9 +2,10 @@
 
 mod light;
 mod random;
+mod sensors;
 
 use nestrad_common::canopy::{Canopy, Material};
-use nestrad_common::options::Diameter;
+use nestrad_common::options::{Diameter, Scatter};
 use nestrad_proto::v1;
 use nestrad_proto::v1::scene_material::Kind;
 
@@ -308,10 +309,12 @@ fn options_have_the_defaults_of_the_command_line() {
         memory_gi_b: Some(2.0),
         seed: Some(0),
         estimator: v1::Estimator::Rays.into(),
+        scatter: v1::Scatter::None.into(),
     })
     .unwrap();
     assert_eq!((given.diameter, given.seed), (Diameter::Infinite, 0));
     assert_eq!(given.estimator, Estimator::Rays);
+    assert_eq!(given.scatter, Scatter::None);
     let with = |change: fn(&mut v1::SolveOptions)| {
         let mut options = v1::SolveOptions::default();
         change(&mut options);
@@ -334,6 +337,10 @@ fn options_have_the_defaults_of_the_command_line() {
         (
             with(|o| o.estimator = 7),
             "options.estimator: expected lines or rays",
+        ),
+        (
+            with(|o| o.scatter = 7),
+            "options.scatter: expected all or none",
         ),
     ] {
         assert!(message.contains(said), "{said}: {message}");
