@@ -70,9 +70,9 @@ class Balance(Mapping[str, BandBalance]):
 
     def to_pandas(self) -> pd.DataFrame:
         """One line per band and term. Needs pandas."""
-        frame: pd.DataFrame = package("pandas").DataFrame(
-            list(self.rows()), columns=["band", "term", "power_W", "power_se_W"]
-        )
+        columns = ["band", "term", "power_W", "power_se_W"]
+        frame: pd.DataFrame = package("pandas").DataFrame(list(self.rows()), columns=columns)
+        return frame
 
     def __repr__(self) -> str:
         return "\n".join(f"{b:8} {t:20} {v:12.5g} W +- {s:.2g}" for b, t, v, s in self.rows())
