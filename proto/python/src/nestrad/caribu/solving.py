@@ -50,8 +50,11 @@ class Scene:
     is_soil: Any = None
 
     def canopy(self, ground: Ground | None, materials: Any = None) -> Canopy:
-        """The canopy of a solve, the last triangle first: of triangles in one place CARIBU lights the first, nestrad the
-        last."""
+        """The canopy of a solve.
+
+        Of triangles in one place CARIBU lights the first. nestrad lights the one of the last organ by name, and there
+        the last triangle: so triangles stand in reverse order, and organs are numbered downwards.
+        """
         soil = np.zeros(len(self.triangles), bool) if self.is_soil is None else self.is_soil
         names = self.materials.of_triangle if materials is None else materials
         numbers = 2 * names.astype(np.int64) + soil
@@ -59,7 +62,7 @@ class Scene:
         groups = np.arange(len(self.triangles)) if self.groups is None else self.groups
         return Canopy(
             self.triangles[::-1],
-            organ=groups[::-1],
+            organ=(groups.max() - groups)[::-1],
             material=numbers[::-1],
             kind={str(number): "leaf" for number in np.unique(numbers).tolist()} | kinds,
             pattern=self.pattern,
