@@ -88,7 +88,8 @@ class LocalMaster:
         finally:
             for file in files:
                 os.close(file)
-        threading.Thread(target=self._follow, name="nestrad log", daemon=True).start()
+        self._following = threading.Thread(target=self._follow, name="nestrad log", daemon=True)
+        self._following.start()
         self.address = self._wait_until_it_serves(program)
         atexit.register(self.close)
 
@@ -96,12 +97,13 @@ class LocalMaster:
         stderr = self._process.stderr
         assert stderr is not None
         waits = True
-        for line in stderr:
-            text = line.decode(errors="replace").rstrip()
-            self._log.append(text)
-            if waits:
-                self._lines.put(text)
-                waits = _SERVES not in text
+        with stderr:
+            for line in stderr:
+                text = line.decode(errors="replace").rstrip()
+                self._log.append(text)
+                if waits:
+                    self._lines.put(text)
+                    waits = _SERVES not in text
         self._lines.put(None)
 
     def _wait_until_it_serves(self, program: Path) -> str:
@@ -140,6 +142,7 @@ class LocalMaster:
         except subprocess.TimeoutExpired:
             self._process.kill()
             self._process.wait()
+        self._following.join(_END_S)
 
 
 _OF_PROCESS: dict[int, LocalMaster] = {}

@@ -8,7 +8,7 @@ you give per m2 of ground comes out per m2 of leaf. What is different:
 * Black materials, and materials with equal reflectance and transmittance, give right values where CARIBU refuses them
   or answers -1: `Ei_sup` and `Ei_inf` are always there, and `Ei` is their sum, for faces of unequal optics too. A
   triangle without area has NaN, as with CARIBU.
-* `screen_size`, `screen_resolution`, `layers`, `height`, `debug`, `filecache`, `canfile` and `optfile` have no effect:
+* `screen_size`, `screen_resolution`, `layers`, `height`, `debug`, `filecache`, `canfile` and `optfile` do nothing:
   nestrad plans by accuracy, and its far field follows from the scene.
 * `d_sphere = 0` (layers alone) is solved on the true geometry.
 * Without a soil mesh the ground of an infinite scene is a plane at `z_soil`; by default at 0, or at the lowest point of a
