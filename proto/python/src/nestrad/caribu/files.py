@@ -36,14 +36,14 @@ def can(path: str | Path) -> dict[str, Floats]:
     """The triangles of each label; polygons become fans."""
     found: dict[str, list[Any]] = {}
     for place, words in _lines(path):
-        expected = "a polygon, 'p N label... V x y z ...'"
+        polygon = "a polygon, 'p N label... V x y z ...'"
         if words[0] != "p" or len(words) < 2 or not words[1].isdigit():
-            raise InputError(f"{place}: {expected}")
+            raise InputError(f"{place}: expected {polygon}")
         labels = int(words[1])
         rest = words[2 + labels :]
         if labels < 1 or not rest or not rest[0].isdigit() or len(rest) != 1 + 3 * int(rest[0]):
-            raise InputError(f"{place}: {expected}")
-        points = np.array(_numbers(place, rest[1:], expected)).reshape(-1, 3)
+            raise InputError(f"{place}: expected {polygon}")
+        points = np.array(_numbers(place, rest[1:], polygon)).reshape(-1, 3)
         for k in range(1, len(points) - 1):
             found.setdefault(words[2], []).append((points[0], points[k], points[k + 1]))
     return {label: np.array(triangles) for label, triangles in found.items()}
