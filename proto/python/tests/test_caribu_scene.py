@@ -109,7 +109,8 @@ def test_incident_energy():
 
 def test_files(tmp_path):
     names = {
-        "leaf.can": "# a leaf and a stem\np 1 100001001000 3 0 0 1 1 0 1 0 1 1\np 2 100001000000 7 4 0 0 0 1 0 0 1 1 0 0 1 0\n",
+        "leaf.can": "# a leaf and a stem\np 1 100001001000 3 0 0 1 1 0 1 0 1 1\n"
+        "p 2 100001000000 7 4 0 0 0 1 0 0 1 1 0 0 1 0\n",
         "par.opt": "n 1\ns d 0.2\ne d 0.13 d 0.06 0.07 d 0.06 0.07\n",
         "sky.light": "60 0 0 -1\n40 0.1 0 -1\n",
         "a.8": "-1 -1\n2 2\n",
@@ -132,7 +133,7 @@ def test_files(tmp_path):
     (tmp_path / "bad.can").write_text("p 1 1 3 0 0\n")
     with pytest.raises(ValueError, match=r"bad.can:1: expected a polygon"):
         CaribuScene(str(tmp_path / "bad.can"))
-    with pytest.raises(ValueError, match="no.can: expected a file"):
+    with pytest.raises(ValueError, match=r"no\.can: expected a file"):
         CaribuScene(str(tmp_path / "no.can"))
 
 

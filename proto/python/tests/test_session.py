@@ -38,7 +38,7 @@ def test_a_master_wants_its_token(canopy, sun, tmp_path):
         for token in (None, "a-token-of-somebody-else", "a-token-of-the-workers"):
             with (
                 nestrad.Session(master.address, token=token) as session,
-                pytest.raises(AccessError, match="token|credentials"),
+                pytest.raises(AccessError, match=r"token|credentials"),
             ):
                 session.solve(canopy, OPTICS, sun)
         with nestrad.Session(master.target, token=TOKEN) as session:
