@@ -29,7 +29,7 @@ def leaves(count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     vertices = np.stack(corners, axis=1).reshape(-1, 3)
     vertices[:, 2] += 0.01
     first = 4 * np.arange(quads)[:, None]
-    triangles = np.concatenate([first + [0, 1, 2], first + [0, 2, 3]], axis=1).reshape(-1, 3)
+    triangles = np.concatenate([first + corner for corner in ([0, 1, 2], [0, 2, 3])], axis=1).reshape(-1, 3)
     return vertices, triangles, np.arange(2 * quads) // 200
 
 
