@@ -74,7 +74,8 @@ def main() -> None:
         f"{100 * outside_s / found.cost.cpu_s:.1f} % of the solve"
     )
     print(
-        f"arrays: {given / 1e6:.0f} MB given, {got / 1e6:.0f} MB of results; beside those given at most {taken / 1e6:.0f} MB"
+        f"arrays: {given / 1e6:.0f} MB given, {got / 1e6:.0f} MB of results; "
+        f"beside those given at most {taken / 1e6:.0f} MB"
     )
 
 
