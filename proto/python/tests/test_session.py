@@ -1,6 +1,7 @@
 """Sessions: masters elsewhere, canopies that stay resident."""
 
 import os
+import subprocess
 import threading
 import time
 
@@ -22,13 +23,38 @@ def test_a_canopy_is_uploaded_and_traced_once(canopy):
         found = [resident.light(sun, accuracy=2) for sun in suns]
         dry = {band: dict(optics, leaf=(0.3, 0.2)) for band, optics in OPTICS.items()}
         found.append(resident.solve(suns[0], dry, accuracy=2))
-        assert session.version()
+        assert session.status().version
     uploads = [line for line in master.log if "scene uploaded" in line]
     assert len(uploads) == 4
     assert len({f.organs.absorbed_W.sum() for f in found}) == 4
     # as if each had been alone
     alone = nestrad.solve(canopy, OPTICS, suns[1], accuracy=2)
     assert (alone.organs.absorbed_W == found[1].organs.absorbed_W).all()
+
+
+def test_workers_compute_for_a_session(canopy, sun, tmp_path):
+    worker = program.find().parent / "nestrad-worker"
+    if not worker.exists():
+        pytest.skip(f"there is no {worker}")
+    clients = token_file(tmp_path, "clients", TOKEN)
+    workers = token_file(tmp_path, "workers", "a-token-of-the-workers")
+    with Served("--client-token", clients, "--worker-token", workers) as master:
+        command = [str(worker), "--master", master.address, "--threads", "1", "--token-file", workers]
+        with (
+            subprocess.Popen(command, stdin=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process,
+            nestrad.Session(master.address, token=TOKEN) as session,
+        ):
+            try:
+                begun = time.monotonic()
+                while not session.status().workers:
+                    assert time.monotonic() - begun < 60
+                    time.sleep(0.05)
+                found = session.solve(canopy, OPTICS, sun, accuracy=1)
+                assert sum(worker.done for worker in session.status().workers) > 0
+            finally:
+                process.terminate()
+    here = nestrad.solve(canopy, OPTICS, sun, accuracy=1)
+    assert (found.triangles.absorbed_W_m2 == here.triangles.absorbed_W_m2).all()
 
 
 def test_a_master_wants_its_token(canopy, sun, tmp_path):

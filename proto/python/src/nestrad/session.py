@@ -88,9 +88,9 @@ class Session:
         """The light of a canopy: see `nestrad.solve`."""
         return self.canopy(canopy).solve(light, optics, **options)
 
-    def version(self) -> str:
-        """The version of the master."""
-        return str(self._calls.answer("Status", protocol.StatusRequest()).version)
+    def status(self) -> Any:
+        """The master, its workers and its load: the message StatusResponse of client.proto, which names its fields."""
+        return self._calls.answer("Status", protocol.StatusRequest())
 
     def close(self) -> None:
         """Ends the session. A master that the process shares goes on until the process ends."""

@@ -150,10 +150,16 @@ class Solve:
         canopy = self._resident.canopy
         bands = [band.name for band in self._bands]
 
-        def fetch(table: str) -> Iterator[memoryview]:
+        def begun(table: str) -> Any:
             number = protocol.value("ResultTable", f"RESULT_TABLE_{table.upper()}")
-            request = protocol.FetchResultsRequest(solve_id=self._solve_id, table=number)
-            return map(memoryview, _interruptible(self._calls.FetchResults(request, None)))
+            return self._calls.FetchResults(protocol.FetchResultsRequest(solve_id=self._solve_id, table=number), None)
+
+        # all at once: their answers are on the way while others are read
+        tables = ("organs", "triangles", "soil", "summary") if triangles else ("organs", "soil", "summary")
+        calls = {table: begun(table) for table in tables}
+
+        def fetch(table: str) -> Iterator[memoryview]:
+            return map(memoryview, _interruptible(calls[table]))
 
         try:
             organs = fetching.organs(fetch, canopy, bands)
@@ -162,6 +168,9 @@ class Solve:
             summary = fetching.summary(fetch)
         except ValueError as error:
             raise MasterError(f"the master sent what cannot be read: {error}") from None
+        finally:
+            for call in calls.values():
+                call.cancel()
         faults = (summary.fault,) if summary.fault else ()
         stages = {stage.name: stage.wall_s for stage in summary.stages}
         return CanopyLight(
