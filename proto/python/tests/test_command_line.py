@@ -78,9 +78,10 @@ def test_the_numbers_are_those_of_the_command_line(tmp_path, accuracy):
         for name in columns:
             assert theirs[name].tolist() == nine_digits(getattr(ours, name)), name
         assert theirs["area_m2"].tolist() == nine_digits(np.repeat(ours.area_m2, 2))
-    frame = found.organs.to_pandas()
-    for name in ("species", "plant", "organ", "kind", "band"):
-        assert frame[name].tolist() == organs[name].tolist(), name
+    for frame, theirs in ((found.organs.to_pandas(), organs), (found.triangles.to_pandas(), triangles)):
+        assert list(frame.columns) == list(theirs)
+        for name in ("species", "plant", "organ", "kind", "band"):
+            assert frame[name].tolist() == theirs[name].tolist(), name
 
 
 def test_a_sky_of_the_command_line_is_the_same_sky(tmp_path):

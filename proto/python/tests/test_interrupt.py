@@ -9,7 +9,6 @@ import sys
 import time
 from pathlib import Path
 
-import pytest
 from served import Served
 
 import nestrad
@@ -98,8 +97,7 @@ def test_a_master_ends_with_a_process_that_is_killed():
     until(lambda: not lives(master), "the master ends")
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="there is no fork")
-def test_a_forked_process_has_a_master_of_its_own():
+def test_a_process_of_its_own_has_a_master_of_its_own():
     code = f"""
 import sys, os, multiprocessing
 sys.path.insert(0, {str(_HERE)!r})

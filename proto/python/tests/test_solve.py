@@ -5,7 +5,7 @@ import sys
 
 import numpy as np
 import pytest
-from conftest import OPTICS, small_canopy
+from conftest import OPTICS, ribbons, small_canopy
 
 import nestrad
 from nestrad import InputError, LimitError
@@ -66,7 +66,10 @@ def test_tables_become_those_of_pandas_and_xarray(found):
     assert list(frame.columns[:6]) == ["species", "plant", "organ", "kind", "area_m2", "band"]
     assert len(frame) == 40
     assert frame.absorbed_W.to_numpy().reshape(20, 2).tolist() == found.organs.absorbed_W.tolist()
-    assert len(found.triangles.to_pandas()) == 480
+    frame = found.triangles.to_pandas()
+    assert list(frame.columns[:7]) == ["triangle", "species", "plant", "organ", "kind", "area_m2", "band"]
+    assert len(frame) == 480
+    assert frame.plant.tolist() == np.repeat(ribbons()[2], 2).tolist()
     assert len(found.soil.to_pandas()) == 2 * len(found.soil)
     assert set(found.balance.to_pandas().band) == {"PAR", "NIR"}
     pytest.importorskip("xarray")

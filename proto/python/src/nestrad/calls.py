@@ -18,6 +18,9 @@ _OPTIONS = [
     ("grpc.max_send_message_length", _MOST_MESSAGE_BYTES),
     ("grpc.keepalive_time_ms", 20_000),
     ("grpc.keepalive_timeout_ms", 20_000),
+    # a master that was started again is found again soon
+    ("grpc.initial_reconnect_backoff_ms", 500),
+    ("grpc.max_reconnect_backoff_ms", 2_000),
     ("grpc.enable_retries", 0),
 ]
 _URL = re.compile(r"(?:(https?)://)?([^/\s]+:\d+)/?\Z")

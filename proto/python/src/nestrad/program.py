@@ -64,6 +64,7 @@ class LocalMaster:
 
     def __init__(self, threads: int = 0, memory_GiB: float | None = None) -> None:
         self.token = secrets.token_hex(24)
+        self._owner = os.getpid()
         self._log: deque[str] = deque(maxlen=_LOG_LINES)
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()
         program = find()
@@ -134,6 +135,9 @@ class LocalMaster:
 
     def close(self) -> None:
         """Ends the program, and whatever it computes."""
+        if os.getpid() != self._owner:
+            # a forked process has no part in it
+            return
         atexit.unregister(self.close)
         if self._process.stdin is not None:
             self._process.stdin.close()

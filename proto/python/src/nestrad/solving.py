@@ -35,6 +35,9 @@ _LONGEST_PAUSE_S = 60.0
 _PAUSE_S = 0.5
 _MOST_ROUNDS = 8
 _CANCEL_S = 10.0
+# a stream of progress that ends so soon, without news, is cut off; more of them than these are no accident
+_SHORT_S = 10.0
+_MOST_SHORT = 10
 
 _STATES = {name: protocol.value("SolveState", f"SOLVE_STATE_{name}") for name in ("FINISHED", "FAILED", "CANCELLED")}
 _FAILURES = {
@@ -65,6 +68,8 @@ class Solve:
         self._heard: float | None = None
         self._busy_since: float | None = None
         self._rounds = 0
+        self._short = 0
+        self._told: Any = None
         self._warnings: tuple[str, ...] = ()
         self._plan: tuple[str, ...] = ()
 
@@ -82,7 +87,8 @@ class Solve:
                         self._scene_id = self._solve_id = None
                     since = begun if self._heard is None else self._heard
                     patience = _FIRST_PATIENCE_S if self._heard is None else _PATIENCE_S
-                    if time.monotonic() - since > patience or self._rounds > _MOST_ROUNDS:
+                    lost = self._rounds > _MOST_ROUNDS or self._short > _MOST_SHORT
+                    if lost or time.monotonic() - since > patience:
                         raise MasterError(str(error)) from None
                     time.sleep(_PAUSE_S)
         except BaseException:
@@ -132,19 +138,32 @@ class Solve:
 
     def _watch(self, bar: Bar) -> None:
         request = protocol.WatchSolveRequest(solve_id=self._solve_id)
-        for message in _interruptible(self._calls.WatchSolve(request)):
-            self._heard = time.monotonic()
-            bar.says(message)
-            self._plan += tuple(message.plan)
-            if message.state == _STATES["FINISHED"]:
-                return
-            if message.state == _STATES["CANCELLED"]:
-                self._solve_id = None
-                raise CancelledError("the solve was cancelled at the master")
-            if message.state == _STATES["FAILED"]:
-                self._solve_id = None
-                raise _FAILURES.get(message.failure, SolveError)(message.reason)
-        raise Away("the stream of progress ended before the solve")
+        begun, news = time.monotonic(), False
+        try:
+            for message in _interruptible(self._calls.WatchSolve(request)):
+                now = (message.state, message.stage, message.done, message.total, message.ahead)
+                news = news or now != self._told
+                self._told = now
+                if self._is_over(message, bar):
+                    return
+            raise Away("the stream of progress ended before the solve")
+        except Away:
+            is_short = not news and time.monotonic() - begun < _SHORT_S
+            self._short = self._short + 1 if is_short else 0
+            raise
+
+    def _is_over(self, message: Any, bar: Bar) -> bool:
+        """Takes a message of progress."""
+        self._heard = time.monotonic()
+        bar.says(message)
+        self._plan += tuple(message.plan)
+        if message.state == _STATES["CANCELLED"]:
+            self._solve_id = None
+            raise CancelledError("the solve was cancelled at the master")
+        if message.state == _STATES["FAILED"]:
+            self._solve_id = None
+            raise _FAILURES.get(message.failure, SolveError)(message.reason)
+        return bool(message.state == _STATES["FINISHED"])
 
     def _fetch(self, triangles: bool) -> CanopyLight:
         canopy = self._resident.canopy

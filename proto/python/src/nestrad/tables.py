@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     import xarray as xr
 
 
+Names = npt.NDArray[np.object_]
+
+
 class Table:
     """What all tables can do."""
 
@@ -37,10 +40,12 @@ class Table:
         return {column: getattr(self, column)[:, number] for column in self._per_band}
 
     def to_pandas(self) -> pd.DataFrame:
-        """One line per row and band, with the columns of the command line's table. Needs pandas."""
+        """One line per row and band. Needs pandas."""
         pandas = package("pandas")
         count = len(self.bands)
         columns: dict[str, Any] = {}
+        if self._rows_are not in self._labels:
+            columns[self._rows_are] = np.repeat(np.arange(len(self)), count)
         for name in (*self._labels, *self._per_row):
             columns[name] = np.repeat(np.asarray(getattr(self, name)), count)
         columns["band"] = np.tile(np.array(self.bands), len(self))
@@ -111,8 +116,8 @@ class TriangleTable(Table):
     none."""
 
     bands: tuple[str, ...]
-    #: (n,), the number of the organ of each triangle
-    organ_index: npt.NDArray[np.uint32]
+    #: whose triangles they are
+    canopy: Canopy
     #: (n,), one-sided
     area_m2: Floats
     #: (n, bands), as all that follow
@@ -126,7 +131,8 @@ class TriangleTable(Table):
     absorbed_se_W_m2: Floats
 
     _rows_are = "triangle"
-    _per_row = ("organ_index", "area_m2")
+    _labels = ("species", "plant", "organ", "kind")
+    _per_row = ("area_m2",)
     _per_band = (
         "irradiance_upper_W_m2",
         "irradiance_lower_W_m2",
@@ -134,6 +140,32 @@ class TriangleTable(Table):
         "absorbed_direct_W_m2",
         "absorbed_se_W_m2",
     )
+
+    @property
+    def organ_index(self) -> npt.NDArray[np.uint32]:
+        """(n,), the number of the organ of each triangle: its row in the table of organs."""
+        return self.canopy.organ_of_triangle
+
+    @property
+    def species(self) -> Names:
+        """(n,), the species of each triangle."""
+        return np.array(self.canopy.species, object)[self.organ_index]
+
+    @property
+    def plant(self) -> Names:
+        """(n,), the plant of each triangle."""
+        return np.array(self.canopy.plant, object)[self.organ_index]
+
+    @property
+    def organ(self) -> Names:
+        """(n,), the organ of each triangle."""
+        return np.array(self.canopy.organ, object)[self.organ_index]
+
+    @property
+    def kind(self) -> Names:
+        """(n,), leaf, stem, soil or structure."""
+        kinds = [material.kind for material in self.canopy.materials]
+        return np.array(kinds, object)[self.canopy.material_of_triangle]
 
 
 @dataclass(repr=False)
@@ -176,7 +208,7 @@ def empty_triangles(canopy: Canopy, bands: Sequence[str]) -> TriangleTable:
     """A table to be filled."""
     shape = (len(canopy), len(bands))
     columns = (np.zeros(shape) for _ in TriangleTable._per_band)
-    return TriangleTable(tuple(bands), canopy.organ_of_triangle, np.zeros(len(canopy)), *columns)
+    return TriangleTable(tuple(bands), canopy, np.zeros(len(canopy)), *columns)
 
 
 def _band(bands: Sequence[str], name: str) -> int:
