@@ -18,7 +18,9 @@ _PATIENCE_S = 60.0
 _HERE = Path(__file__).parent
 
 LONG_SOLVE = """
-import sys
+import signal, sys
+# a shell that runs the tests in the background has them ignore it
+signal.signal(signal.SIGINT, signal.default_int_handler)
 sys.path.insert(0, {here!r})
 from conftest import OPTICS, small_canopy
 import nestrad

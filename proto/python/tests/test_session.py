@@ -1,6 +1,7 @@
 """Sessions: masters elsewhere, canopies that stay resident."""
 
 import os
+import shutil
 import subprocess
 import threading
 import time
@@ -72,6 +73,20 @@ def test_a_master_wants_its_token(canopy, sun, tmp_path):
     assert not any(TOKEN in line for line in master.log)
 
 
+def test_https_with_an_authority_and_a_certificate(canopy, sun, tmp_path):
+    if shutil.which("openssl") is None:
+        pytest.skip("there is no openssl, which makes certificates")
+    key, cert = tmp_path / "key.pem", tmp_path / "cert.pem"
+    make = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "2", "-subj", "/CN=master"]
+    make += ["-addext", "subjectAltName=IP:127.0.0.1", "-keyout", str(key), "-out", str(cert)]
+    subprocess.run(make, check=True, capture_output=True)
+    token = token_file(tmp_path, "clients", TOKEN)
+    with Served("--tls-cert", str(cert), "--tls-key", str(key), "--client-token", token) as master:
+        for ca in (cert, cert.read_bytes()):
+            with nestrad.Session(f"https://{master.target}", token=TOKEN, ca=ca) as session:
+                assert len(session.solve(canopy, OPTICS, sun, accuracy=5).organs) == 20
+
+
 def test_a_master_that_was_started_again_gets_the_canopy_again(canopy, sun):
     with Served() as first:
         target = first.target
@@ -89,8 +104,7 @@ def test_a_solve_outlives_a_master_that_is_killed_meanwhile(canopy, sun):
         seen, again = [], []
 
         def look(now):
-            # once it is being computed
-            if not seen and now.stage:
+            if not seen:
                 first.stop()
                 again.append(Served(listen=first.target))
             seen.append(now)
