@@ -99,18 +99,20 @@ def test_a_master_that_was_started_again_gets_the_canopy_again(canopy, sun):
 
 
 def test_a_solve_outlives_a_master_that_is_killed_meanwhile(canopy, sun):
-    first = Served()
-    with nestrad.Session(first.address) as session:
-        seen, again = [], []
+    masters = [Served()]
 
-        def look(now):
-            if not seen:
-                first.stop()
-                again.append(Served(listen=first.target))
-            seen.append(now)
+    def look(_):
+        if len(masters) == 1:
+            masters[0].stop()
+            masters.append(Served(listen=masters[0].target))
 
-        found = session.solve(canopy, OPTICS, sun, accuracy=0.5, progress=look)
-        again[0].stop()
+    try:
+        with nestrad.Session(masters[0].address) as session:
+            found = session.solve(canopy, OPTICS, sun, accuracy=0.5, progress=look)
+    finally:
+        for master in masters:
+            master.stop()
+    assert len(masters) == 2
     assert (found.organs.absorbed_W == nestrad.solve(canopy, OPTICS, sun, accuracy=0.5).organs.absorbed_W).all()
 
 
