@@ -8,7 +8,7 @@ use thiserror::Error;
 use crate::canopy::Kind;
 use crate::formats::Place;
 use crate::light::sun::{Sun, SunError};
-use crate::light::{AN_IRRADIANCE, Sky, is_irradiance};
+use crate::light::{AN_IRRADIANCE, MOST_GLOBAL_W_M2, Sky, SunnySky, is_irradiance};
 use crate::optics::LeafOptics;
 use crate::options::{Options, Unit, Up};
 
@@ -138,7 +138,8 @@ impl LightInput {
                 return Err(LightFault::Irradiance { band, found });
             }
         }
-        let Sky::Clear {
+        let Sky::Sunny {
+            model,
             time_utc,
             latitude_deg,
             longitude_deg,
@@ -147,7 +148,12 @@ impl LightInput {
         else {
             return Ok(());
         };
+        let global_W_m2 = match *model {
+            SunnySky::Perez { global_W_m2 } => global_W_m2,
+            SunnySky::Cie(_) => MOST_GLOBAL_W_M2,
+        };
         for (value, found, low, high) in [
+            ("ghi_W_m2", global_W_m2, 1.0, MOST_GLOBAL_W_M2),
             ("latitude_deg", *latitude_deg, -90.0, 90.0),
             ("longitude_deg", *longitude_deg, -180.0, 180.0),
             ("diffuse_fraction", *diffuse_fraction, 0.0, 1.0),

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use super::canopy::Generated;
 use super::drafts::{Drafts, is_own};
 use super::error::WriteError;
-use crate::light::Sky;
 use crate::light::sky::SkyError;
+use crate::light::{CieType, Sky, SunnySky};
 
 /// Typical of green leaves; upper and lower faces differ, as they do in nature.
 const PAR_OPT: &str = "\
@@ -122,7 +122,8 @@ fn refuse_foreign(paths: impl Iterator<Item = PathBuf>) -> Result<(), WriteError
 
 /// A summer morning at 45 degrees north: 500 W m⁻², a fifth of it from the sky.
 fn clear_light() -> Result<String, SkyError> {
-    let sky = Sky::Clear {
+    let sky = Sky::Sunny {
+        model: SunnySky::Cie(CieType::CLEAR),
         time_utc: "2024-06-21T10:00:00Z".to_owned(),
         latitude_deg: 45.0,
         longitude_deg: 0.0,

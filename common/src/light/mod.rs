@@ -2,6 +2,7 @@
 
 pub mod atmosphere;
 mod check;
+mod model;
 pub mod perez;
 pub mod photons;
 pub mod radiance;
@@ -15,9 +16,10 @@ use std::num::NonZeroUsize;
 use glam::DVec3;
 
 pub use check::{LightError, Origin};
+pub use model::{SKY_NAMES, SkyModel};
 pub use radiance::{CieType, Radiance};
 pub use sky::SkyLight;
-pub use spec::Sky;
+pub use spec::{MOST_GLOBAL_W_M2, Sky, SunnySky};
 
 /// Sources closer to the horizon than this (the sine of 0.0057 degrees) are refused as horizontal:
 /// at a given irradiance of the horizontal their beams would be without bounds.
@@ -67,6 +69,16 @@ impl Source {
         let towards = -self.direction + DVec3::ZERO;
         let azimuth = towards.x.atan2(towards.y).to_degrees().rem_euclid(360.0);
         if azimuth < 360.0 { azimuth } else { 0.0 }
+    }
+
+    /// Irradiance of the horizontal, all bands together, W m⁻².
+    pub fn irradiance_of_bands_W_m2(&self) -> f64 {
+        self.irradiance_W_m2.iter().sum()
+    }
+
+    /// Irradiance of a plane that faces it, all bands together, W m⁻².
+    pub fn intensity_W_m2(&self) -> f64 {
+        self.irradiance_of_bands_W_m2() / -self.direction.z
     }
 }
 

@@ -82,6 +82,9 @@ const COEFFICIENTS: [[[f64; 4]; 5]; 8] = [
     ],
 ];
 
+/// What stands for no diffuse light at all, W m⁻².
+const LEAST_DIFFUSE_W_M2: f64 = 1e-6;
+
 impl Perez {
     /// The sky of measured irradiances, W m⁻²: diffuse of the horizontal (above 0), direct perpendicular to the beam,
     /// and extraterrestrial perpendicular to the beam on that day.
@@ -104,6 +107,19 @@ impl Perez {
             clearness: clearness.max(CLEARNESS.0).min(CLEARNESS.1),
             brightness: brightness.max(BRIGHTNESS.0).min(BRIGHTNESS.1),
         }
+    }
+
+    /// The same of direct and diffuse irradiance of the horizontal. Without diffuse light it is as if there were a little.
+    pub fn of_horizontal(
+        towards_sun: DVec3,
+        (direct_W_m2, diffuse_W_m2): (f64, f64),
+        extraterrestrial_W_m2: f64,
+    ) -> Self {
+        let irradiance = (
+            diffuse_W_m2.max(LEAST_DIFFUSE_W_M2),
+            direct_W_m2 / towards_sun.z,
+        );
+        Self::of_irradiance(towards_sun, irradiance, extraterrestrial_W_m2)
     }
 
     /// Equation 4 of the paper, 0 where it is negative.

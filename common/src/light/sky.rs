@@ -14,8 +14,11 @@ use rand::{RngExt, SeedableRng};
 use rand_pcg::Pcg64;
 use thiserror::Error;
 
-use super::radiance::{CieType, Radiance};
-use super::sun::{Sun, SunError};
+use super::atmosphere::extraterrestrial_W_m2;
+use super::perez::Perez;
+use super::radiance::Radiance;
+use super::spec::SunnySky;
+use super::sun::{Sun, SunError, day_of_year};
 use super::{AN_IRRADIANCE, Light, Sky, Source, is_irradiance};
 
 /// Turn from one direction of the spiral to the next, radians: a full turn over the square of the
@@ -104,7 +107,8 @@ impl Sky {
         match self {
             Self::UniformOvercast => Ok((Radiance::Uniform, 1.0, None)),
             Self::StandardOvercast => Ok((Radiance::MoonSpencer, 1.0, None)),
-            Self::Clear {
+            Self::Sunny {
+                model,
                 time_utc,
                 latitude_deg,
                 longitude_deg,
@@ -115,9 +119,14 @@ impl Sky {
                     return Err(SkyError::DiffuseFraction { value: diffuse });
                 }
                 let sun = Sun::at(time_utc, *latitude_deg, *longitude_deg)?;
-                let radiance = Radiance::Cie {
-                    kind: CieType::CLEAR,
-                    towards_sun: sun.towards(),
+                let towards_sun = sun.towards();
+                let radiance = match *model {
+                    SunnySky::Cie(kind) => Radiance::Cie { kind, towards_sun },
+                    SunnySky::Perez { global_W_m2 } => Radiance::Perez(Perez::of_horizontal(
+                        towards_sun,
+                        ((1.0 - diffuse) * global_W_m2, diffuse * global_W_m2),
+                        extraterrestrial_W_m2(day_of_year(time_utc)?),
+                    )),
                 };
                 let visible = (diffuse < 1.0).then_some(sun);
                 Ok((radiance, diffuse, visible))

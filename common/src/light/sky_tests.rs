@@ -1,4 +1,5 @@
 use super::*;
+use crate::light::CieType;
 use proptest::prelude::*;
 
 fn count(n: usize) -> NonZeroUsize {
@@ -6,7 +7,8 @@ fn count(n: usize) -> NonZeroUsize {
 }
 
 fn clear(diffuse_fraction: f64) -> Sky {
-    Sky::Clear {
+    Sky::Sunny {
+        model: SunnySky::Cie(CieType::CLEAR),
         time_utc: "2024-06-21T09:00:00Z".into(),
         latitude_deg: 43.6,
         longitude_deg: 3.9,
@@ -176,4 +178,29 @@ fn the_number_of_directions_follows_the_accuracy() {
         let found = directions_for(accuracy_percent).get();
         assert_eq!(found, expected, "{accuracy_percent}");
     }
+}
+
+/// The sky of Perez of a solve is that of a row of weather with the same irradiances.
+#[test]
+fn a_sky_of_perez_is_that_of_the_weather() {
+    let sky = Sky::Sunny {
+        model: SunnySky::Perez { global_W_m2: 800.0 },
+        time_utc: "2024-06-21T09:00:00Z".into(),
+        latitude_deg: 43.6,
+        longitude_deg: 3.9,
+        diffuse_fraction: 0.25,
+    };
+    let light = sky.light(vec![400.0]).unwrap();
+    let sun = Sun::at("2024-06-21T09:00:00Z", 43.6, 3.9).unwrap();
+    let outside_W_m2 = extraterrestrial_W_m2(173);
+    let expected = Perez::of_irradiance(
+        sun.towards(),
+        (200.0, 600.0 / sun.towards().z),
+        outside_W_m2,
+    );
+    assert_eq!(
+        light.sky.as_ref().unwrap().radiance,
+        Radiance::Perez(expected)
+    );
+    assert_eq!(light.suns[0].irradiance_W_m2, [300.0]);
 }

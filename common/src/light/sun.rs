@@ -6,7 +6,7 @@ use jiff::tz::Offset;
 use solar_positioning::time::JulianDate;
 use solar_positioning::{Location, RefractionCorrection, SolarPositions, delta_t};
 use thiserror::Error;
-use toml::value::{Datetime, Offset as GivenOffset};
+use toml::value::{Date, Datetime, Offset as GivenOffset, Time};
 
 use super::MIN_DESCENT;
 use crate::figures::fixed;
@@ -95,13 +95,41 @@ impl Sun {
     }
 }
 
-fn julian_date(time_utc: &str) -> Result<JulianDate, SunError> {
-    let bad_time = || SunError::Time {
-        given: time_utc.to_owned(),
+/// The day of the year of an RFC 3339 time in UTC, from 1.
+pub(super) fn day_of_year(time_utc: &str) -> Result<u16, SunError> {
+    let (date, _) = date_and_time(time_utc)?;
+    let day = [date.month, date.day].map(|number| i8::try_from(number).ok());
+    let [Some(month), Some(day)] = day else {
+        return Err(bad_time(time_utc));
     };
-    let parsed: Datetime = time_utc.trim().parse().map_err(|_| bad_time())?;
+    let date = i16::try_from(date.year)
+        .ok()
+        .map(|year| jiff::civil::Date::new(year, month, day));
+    match date {
+        Some(Ok(date)) => Ok(date.day_of_year().unsigned_abs()),
+        _ => Err(bad_time(time_utc)),
+    }
+}
+
+fn julian_date(time_utc: &str) -> Result<JulianDate, SunError> {
+    let (date, time) = date_and_time(time_utc)?;
+    let seconds =
+        f64::from(time.second.unwrap_or(0)) + 1e-9 * f64::from(time.nanosecond.unwrap_or(0));
+    let date = (i32::from(date.year), date.month.into(), date.day.into());
+    let julian = julian(date, (time.hour.into(), time.minute.into()), seconds);
+    julian.map_err(|_| bad_time(time_utc))
+}
+
+fn bad_time(time_utc: &str) -> SunError {
+    SunError::Time {
+        given: time_utc.to_owned(),
+    }
+}
+
+fn date_and_time(time_utc: &str) -> Result<(Date, Time), SunError> {
+    let parsed: Datetime = time_utc.trim().parse().map_err(|_| bad_time(time_utc))?;
     let (Some(date), Some(time)) = (parsed.date, parsed.time) else {
-        return Err(bad_time());
+        return Err(bad_time(time_utc));
     };
     // a local time in a field that is named UTC is more likely a mistake than a wish
     let utc = [
@@ -114,10 +142,7 @@ fn julian_date(time_utc: &str) -> Result<JulianDate, SunError> {
             given: time_utc.to_owned(),
         });
     }
-    let seconds =
-        f64::from(time.second.unwrap_or(0)) + 1e-9 * f64::from(time.nanosecond.unwrap_or(0));
-    let date = (i32::from(date.year), date.month.into(), date.day.into());
-    julian(date, (time.hour.into(), time.minute.into()), seconds).map_err(|_| bad_time())
+    Ok((date, time))
 }
 
 fn julian(

@@ -5,8 +5,9 @@ use jiff::tz::Offset;
 use jiff::{SignedDuration, Timestamp};
 use thiserror::Error;
 
-use super::{Site, SkyModel};
+use super::Site;
 use crate::formats::weather::{Weather, WeatherRow};
+use crate::light::SkyModel;
 use crate::light::atmosphere::{clear, extraterrestrial_W_m2, overcast};
 use crate::light::sun::{Sun, SunError};
 

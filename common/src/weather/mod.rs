@@ -3,8 +3,6 @@
 mod day;
 
 use std::collections::BTreeMap;
-use std::fmt;
-use std::str::FromStr;
 
 use jiff::tz::Offset;
 use jiff::{SignedDuration, Timestamp};
@@ -15,7 +13,7 @@ use crate::formats::{FormatError, Place};
 use crate::light::atmosphere::extraterrestrial_W_m2;
 use crate::light::perez::Perez;
 use crate::light::sun::{Sun, SunError};
-use crate::light::{CieType, Light, Radiance, SkyLight, Source};
+use crate::light::{Light, Radiance, SkyLight, SkyModel, Source};
 
 pub use day::{Day, DayError};
 
@@ -26,61 +24,6 @@ pub struct Site {
     pub latitude_deg: f64,
     /// Degrees, east positive, -180 to 180.
     pub longitude_deg: f64,
-}
-
-/// How diffuse light is distributed over the sky.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum SkyModel {
-    /// The same radiance from everywhere.
-    Uniform,
-    /// Moon & Spencer 1942.
-    MoonSpencer,
-    /// A type of the CIE standard general sky.
-    Cie(CieType),
-    /// The all-weather sky of Perez, Seals & Michalsky 1993, by the irradiances of each row.
-    Perez,
-}
-
-impl SkyModel {
-    /// Whether there is no sun in it: the overcast skies, types 1 to 5 of the CIE among them.
-    pub fn is_overcast(self) -> bool {
-        match self {
-            Self::Uniform | Self::MoonSpencer => true,
-            Self::Cie(kind) => kind.number() <= 5,
-            Self::Perez => false,
-        }
-    }
-}
-
-/// Names of skies, for messages.
-pub const SKY_NAMES: &str =
-    "perez, cie-1 to cie-15, clear (the same as cie-12), standard-overcast or uniform-overcast";
-
-impl FromStr for SkyModel {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let cie = |number: &str| number.parse().ok().and_then(CieType::new).map(Self::Cie);
-        let found = match text {
-            "perez" => Some(Self::Perez),
-            "clear" => Some(Self::Cie(CieType::CLEAR)),
-            "standard-overcast" => Some(Self::MoonSpencer),
-            "uniform-overcast" => Some(Self::Uniform),
-            _ => text.strip_prefix("cie-").and_then(cie),
-        };
-        found.ok_or_else(|| format!("expected {SKY_NAMES}"))
-    }
-}
-
-impl fmt::Display for SkyModel {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Uniform => f.write_str("uniform-overcast"),
-            Self::MoonSpencer => f.write_str("standard-overcast"),
-            Self::Cie(kind) => write!(f, "cie-{}", kind.number()),
-            Self::Perez => f.write_str("perez"),
-        }
-    }
 }
 
 /// A row of the weather as light.
@@ -313,15 +256,12 @@ impl ToLight<'_> {
     }
 }
 
-/// The sky of a row. Without diffuse light in all it is as if there were a little.
+/// The sky of a row.
 fn perez(row: &WeatherRow, sun: Sun, whole: BandIrradiance) -> Perez {
-    let sun = sun.lifted();
-    let towards_sun = sun.towards();
     let day = Offset::UTC.to_datetime(row.moment).day_of_year();
     let outside_W_m2 = extraterrestrial_W_m2(day.unsigned_abs());
-    let diffuse_W_m2 = whole.diffuse_W_m2.max(1e-6);
-    let normal_W_m2 = whole.direct_W_m2 / towards_sun.z;
-    Perez::of_irradiance(towards_sun, (diffuse_W_m2, normal_W_m2), outside_W_m2)
+    let horizontal = (whole.direct_W_m2, whole.diffuse_W_m2);
+    Perez::of_horizontal(sun.lifted().towards(), horizontal, outside_W_m2)
 }
 
 /// Direct and diffuse irradiance of the horizontal over all wavelengths, if the row has them. Where it has three values,

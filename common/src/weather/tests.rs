@@ -1,5 +1,6 @@
 use super::*;
 use crate::formats::weather::parse;
+use crate::light::CieType;
 
 const PLACE: Site = Site {
     latitude_deg: 43.6,

@@ -79,6 +79,10 @@ pub struct WorkDone {
     pub passes: u32,
 }
 
+/// Names of the stages whose time a budget is reckoned by.
+pub(crate) const STAGE_EXCHANGE: &str = "exchange";
+pub(crate) const STAGE_DIRECT_LIGHT: &str = "direct light";
+
 impl TracedCanopy {
     /// Traces a canopy as planned.
     pub fn trace(
@@ -137,7 +141,7 @@ impl TracedCanopy {
             groups: Groups::of(&frame),
             far,
         });
-        watch.lap("exchange");
+        watch.lap(STAGE_EXCHANGE);
         let traced = Self {
             frame,
             scattering,
@@ -299,7 +303,7 @@ impl<'a> FramedLight<'a> {
         };
         let seed = self.plan.seed;
         let direct = direct_light_keeping(frame, &self.optics, projections, seed, kept, step)?;
-        watch.lap("direct light");
+        watch.lap(STAGE_DIRECT_LIGHT);
         Ok(direct)
     }
 }

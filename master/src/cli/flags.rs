@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use anyhow::Result;
 use clap::error::ErrorKind;
-use clap::{Args, ValueEnum};
+use clap::Args;
 use nestrad_common::assemble;
 use nestrad_common::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
-use nestrad_common::light::Sky;
+use nestrad_common::light::{Sky, SkyModel, SunnySky};
 use nestrad_common::options::{Options, Unit, Up};
 
 use super::numbers::number;
@@ -70,74 +70,66 @@ struct LightFlags {
     #[arg(long, value_name = "FILE|NAME=FILE", value_parser = light_file)]
     light: Vec<(Option<String>, PathBuf)>,
 
-    /// A built-in sky instead of --light; needs --irradiance
+    /// A built-in sky instead of --light; needs --irradiance: standard-overcast (Moon and Spencer: the zenith three times
+    /// as bright as the horizon) or uniform-overcast; or a sky with its sun, clear (the same as cie-12), cie-1 to cie-15 or
+    /// perez, which needs --time, --latitude, --longitude and --diffuse-fraction
     #[arg(
         long,
-        value_enum,
+        value_parser = sky_model,
         value_name = "SKY",
         conflicts_with = "light",
         requires = "irradiance"
     )]
-    sky: Option<SkyKind>,
+    sky: Option<SkyModel>,
 
     /// Irradiance of the sky on a horizontal surface above the canopy in a band, W m-2; once for each band
     #[arg(long, value_name = "NAME=W_m2", value_parser = named_number, requires = "sky")]
     irradiance: Vec<(String, f64)>,
 
-    /// Clear sky: date and time in UTC, such as 2024-06-21T10:00:00Z (or +00:00)
-    #[arg(
-        long,
-        value_name = "UTC",
-        requires = "sky",
-        required_if_eq("sky", "clear")
-    )]
+    /// Sky with a sun: date and time in UTC, such as 2024-06-21T10:00:00Z (or +00:00)
+    #[arg(long, value_name = "UTC", requires = "sky")]
     time: Option<String>,
 
-    /// Clear sky: degrees, north positive
+    /// Sky with a sun: degrees, north positive
     #[arg(
         long,
         value_name = "DEGREES",
         requires = "sky",
-        required_if_eq("sky", "clear"),
         value_parser = number,
         allow_negative_numbers = true
     )]
     latitude: Option<f64>,
 
-    /// Clear sky: degrees, east positive
+    /// Sky with a sun: degrees, east positive
     #[arg(
         long,
         value_name = "DEGREES",
         requires = "sky",
-        required_if_eq("sky", "clear"),
         value_parser = number,
         allow_negative_numbers = true
     )]
     longitude: Option<f64>,
 
-    /// Clear sky: the diffuse part of the irradiance, 0 to 1; the rest comes directly from the sun
+    /// Sky with a sun: the diffuse part of the irradiance, 0 to 1; the rest comes directly from the sun
     #[arg(
         long,
         value_name = "PART",
         requires = "sky",
-        required_if_eq("sky", "clear"),
         value_parser = number,
         allow_negative_numbers = true
     )]
     diffuse_fraction: Option<f64>,
-}
 
-/// A built-in sky.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum SkyKind {
-    /// The same radiance from everywhere
-    #[value(alias = "uniform_overcast")]
-    UniformOvercast,
-    /// Moon and Spencer: the zenith three times as bright as the horizon
-    #[value(alias = "standard_overcast")]
-    StandardOvercast,
-    /// CIE clear sky and the sun, at --time, --latitude and --longitude
-    Clear,
+    /// Sky of Perez: global irradiance of the horizontal, all wavelengths together, W m-2; with --diffuse-fraction it says
+    /// how clear and how bright the sky is
+    #[arg(
+        long,
+        value_name = "W_m2",
+        requires = "sky",
+        value_parser = number,
+        allow_negative_numbers = true
+    )]
+    ghi: Option<f64>,
 }
 
 impl SceneFlags {
@@ -209,30 +201,50 @@ impl LightFlags {
         }
     }
 
-    fn sky(self, kind: SkyKind) -> Result<Sky> {
-        let given = (
+    fn sky(self, model: SkyModel) -> Result<Sky> {
+        let sun = (
             self.time,
             self.latitude,
             self.longitude,
             self.diffuse_fraction,
         );
-        match (kind, given) {
-            (SkyKind::UniformOvercast, (None, None, None, None)) => Ok(Sky::UniformOvercast),
-            (SkyKind::StandardOvercast, (None, None, None, None)) => Ok(Sky::StandardOvercast),
-            (SkyKind::Clear, (Some(time_utc), Some(latitude), Some(longitude), Some(diffuse))) => {
-                Ok(Sky::Clear {
+        let sunny = match (model, self.ghi) {
+            (SkyModel::Uniform | SkyModel::MoonSpencer, ghi) => {
+                if ghi.is_some() || sun != (None, None, None, None) {
+                    return Err(misuse(
+                        "--time, --latitude, --longitude, --diffuse-fraction and --ghi are for skies with a sun \
+                         (--sky clear, cie-1 to cie-15, perez)",
+                    ));
+                }
+                return Ok(match model {
+                    SkyModel::Uniform => Sky::UniformOvercast,
+                    _ => Sky::StandardOvercast,
+                });
+            }
+            (SkyModel::Cie(kind), None) => SunnySky::Cie(kind),
+            (SkyModel::Cie(_), Some(_)) => return Err(misuse("--ghi is for --sky perez")),
+            (SkyModel::Perez, Some(global_W_m2)) => SunnySky::Perez { global_W_m2 },
+            (SkyModel::Perez, None) => return Err(misuse("--sky perez needs --ghi")),
+        };
+        match sun {
+            (Some(time_utc), Some(latitude_deg), Some(longitude_deg), Some(diffuse_fraction)) => {
+                Ok(Sky::Sunny {
+                    model: sunny,
                     time_utc,
-                    latitude_deg: latitude,
-                    longitude_deg: longitude,
-                    diffuse_fraction: diffuse,
+                    latitude_deg,
+                    longitude_deg,
+                    diffuse_fraction,
                 })
             }
-            // that a clear sky has all of them is checked by the parser
-            _ => Err(misuse(
-                "--time, --latitude, --longitude and --diffuse-fraction are for --sky clear",
-            )),
+            _ => Err(misuse(&format!(
+                "--sky {model} needs --time, --latitude, --longitude and --diffuse-fraction"
+            ))),
         }
     }
+}
+
+pub(super) fn sky_model(text: &str) -> Result<SkyModel, String> {
+    text.parse()
 }
 
 /// A call that makes no sense, found after parsing.

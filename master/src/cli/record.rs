@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use nestrad_common::inputs::{Inputs, LightInput, PatternInput};
-use nestrad_common::light::{Light, Sky};
+use nestrad_common::light::{CieType, Light, Sky, SunnySky};
 use nestrad_common::options::{Diameter, TableFormat, Unit, Up};
 use nestrad_engine::plan::{Estimator, Settings};
 use serde::Serialize;
@@ -124,14 +124,24 @@ fn sky(sky: &Sky) -> String {
     match sky {
         Sky::UniformOvercast => "uniform overcast sky".to_owned(),
         Sky::StandardOvercast => "standard overcast sky".to_owned(),
-        Sky::Clear {
+        Sky::Sunny {
+            model,
             time_utc,
             latitude_deg,
             longitude_deg,
             diffuse_fraction,
-        } => format!(
-            "clear sky at {time_utc}, latitude {latitude_deg}, longitude {longitude_deg}, \
-             diffuse fraction {diffuse_fraction}"
-        ),
+        } => {
+            let name = match model {
+                SunnySky::Cie(kind) if *kind == CieType::CLEAR => "clear sky".to_owned(),
+                SunnySky::Cie(kind) => format!("CIE sky {}", kind.number()),
+                SunnySky::Perez { global_W_m2 } => {
+                    format!("sky of Perez for {global_W_m2} W m-2 of all wavelengths")
+                }
+            };
+            format!(
+                "{name} at {time_utc}, latitude {latitude_deg}, longitude {longitude_deg}, \
+                 diffuse fraction {diffuse_fraction}"
+            )
+        }
     }
 }

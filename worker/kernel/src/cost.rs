@@ -39,6 +39,9 @@ pub const TREE_NS: f64 = 1500.0;
 /// To draw a triangle into the z-buffer of a direction of a sky, ns.
 pub const Z_DRAWN_NS: f64 = 40.0;
 
+/// To deal the light of a direction out to an element, ns.
+pub const Z_DEALT_NS: f64 = 60.0;
+
 /// A point of a z-buffer: drawn, compared with its neighbours, dealt out, ns.
 pub const Z_POINT_NS: f64 = 75.0;
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use super::*;
-use crate::light::MIN_DESCENT;
+use crate::light::{CieType, MIN_DESCENT, SunnySky};
 
 #[test]
 fn light_per_band_shares_directions_and_leaves_out_the_dark() {
@@ -43,7 +43,8 @@ fn fault_at_sunrise_a_leaf_got_27_kW_m2() {
     let mut case = Case::new(LEAF);
     let mut at = |time_utc: &str| {
         case.inputs.light = Some(LightInput::Sky {
-            sky: Sky::Clear {
+            sky: Sky::Sunny {
+                model: SunnySky::Cie(CieType::CLEAR),
                 time_utc: time_utc.into(),
                 latitude_deg: 43.6,
                 longitude_deg: 3.9,

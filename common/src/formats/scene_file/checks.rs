@@ -11,11 +11,11 @@ use super::super::pattern::{Rectangle, refused};
 use super::Text;
 use super::tables::{
     BandTable, FaceTable, KindsTable, LightTable, LightText, MaterialTable, OneOrMany, PatternText,
-    SceneFile, SkyKind, SkyTable, TimeText,
+    SceneFile, SkyTable, TimeText,
 };
 use crate::inputs::{BandInput, Inputs, KindsInput, LightInput, PatternInput};
-use crate::light::Sky;
 use crate::light::photons::flat_spectrum_umol_J;
+use crate::light::{SKY_NAMES, Sky, SkyModel, SunnySky};
 use crate::optics::{AN_ALBEDO, FaceOptics, LeafOptics, is_albedo};
 
 /// Paths become relative to what `folder` is relative to.
@@ -244,43 +244,70 @@ fn light(
 }
 
 fn sky(given: SkyTable, span: &Range<usize>, text: &Text<'_>) -> Result<LightInput, FormatError> {
+    let kind = given.kind.get_ref();
+    let model: SkyModel = kind.parse().map_err(|_| {
+        text.fault(
+            &given.kind.span(),
+            format!("kind of sky: {SKY_NAMES}"),
+            kind,
+        )
+    })?;
+    let irradiance_W_m2 = given.irradiance_W_m2;
     let when_and_where = (
         given.time_utc,
         given.latitude_deg,
         given.longitude_deg,
         given.diffuse_fraction,
     );
-    let sky = match (given.kind, when_and_where) {
-        (SkyKind::UniformOvercast, (None, None, None, None)) => Sky::UniformOvercast,
-        (SkyKind::StandardOvercast, (None, None, None, None)) => Sky::StandardOvercast,
-        (SkyKind::Clear, (Some(time), Some(latitude), Some(longitude), Some(diffuse))) => {
-            Sky::Clear {
-                time_utc: match time {
-                    TimeText::Date(date) => date.to_string(),
-                    TimeText::Text(text) => text,
-                },
-                latitude_deg: latitude,
-                longitude_deg: longitude,
-                diffuse_fraction: diffuse,
+    let sunny = match (model, given.ghi_W_m2) {
+        (SkyModel::Uniform | SkyModel::MoonSpencer, ghi) => {
+            if ghi.is_some() || !matches!(when_and_where, (None, None, None, None)) {
+                let expected = "irradiance_W_m2 alone for an overcast sky";
+                return Err(text.fault(span, expected, "other keys too"));
             }
+            let sky = match model {
+                SkyModel::Uniform => Sky::UniformOvercast,
+                _ => Sky::StandardOvercast,
+            };
+            return Ok(LightInput::Sky {
+                sky,
+                irradiance_W_m2,
+            });
         }
-        (SkyKind::Clear, _) => {
-            return Err(text.fault(
-                span,
-                "time_utc, latitude_deg, longitude_deg and diffuse_fraction for a clear sky",
-                "only some of them",
-            ));
+        (SkyModel::Cie(kind), None) => SunnySky::Cie(kind),
+        (SkyModel::Cie(_), Some(ghi)) => {
+            let expected = "ghi_W_m2 with kind = \"perez\" alone";
+            return Err(text.fault(span, expected, format!("{ghi} with another sky")));
         }
-        _ => {
-            return Err(text.fault(
-                span,
-                "irradiance_W_m2 alone for an overcast sky",
-                "other keys too",
-            ));
+        (SkyModel::Perez, Some(global_W_m2)) => SunnySky::Perez { global_W_m2 },
+        (SkyModel::Perez, None) => {
+            let expected = "ghi_W_m2, the global irradiance of all wavelengths, for a sky of Perez";
+            return Err(text.fault(span, expected, "none"));
         }
+    };
+    let (Some(time), Some(latitude_deg), Some(longitude_deg), Some(diffuse_fraction)) =
+        when_and_where
+    else {
+        return Err(text.fault(
+            span,
+            format!(
+                "time_utc, latitude_deg, longitude_deg and diffuse_fraction for the sky {model}"
+            ),
+            "only some of them",
+        ));
+    };
+    let sky = Sky::Sunny {
+        model: sunny,
+        time_utc: match time {
+            TimeText::Date(date) => date.to_string(),
+            TimeText::Text(text) => text,
+        },
+        latitude_deg,
+        longitude_deg,
+        diffuse_fraction,
     };
     Ok(LightInput::Sky {
         sky,
-        irradiance_W_m2: given.irradiance_W_m2,
+        irradiance_W_m2,
     })
 }

@@ -29,9 +29,9 @@
 //! ```
 //!
 //! In place of `light = "FILE"`: `[light.files]`, with one `.light` file for each band's name, or
-//! `[light.sky]` with `kind = "uniform_overcast"`, `"standard_overcast"` or `"clear"`,
-//! `irradiance_W_m2 = { PAR = 400.0, NIR = 380.0 }`, and for a clear sky `time_utc`, `latitude_deg`,
-//! `longitude_deg`, `diffuse_fraction`. For weather (`nestrad series`, `nestrad day`) `[light.band_fraction]` says which
+//! `[light.sky]` with `irradiance_W_m2 = { PAR = 400.0, NIR = 380.0 }` and `kind = "uniform_overcast"` or
+//! `"standard_overcast"`; or, with the keys `time_utc`, `latitude_deg`, `longitude_deg` and `diffuse_fraction`, `"clear"`,
+//! `"cie_1"` to `"cie_15"` or `"perez"`, which also needs `ghi_W_m2`. For weather (`nestrad series`, `nestrad day`) `[light.band_fraction]` says which
 //! part of broadband irradiance a band gets: `PAR = 0.48`. Paths are relative to the scene file.
 
 mod checks;

@@ -121,24 +121,15 @@ pub(super) struct LightTable {
 }
 
 #[derive(Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum SkyKind {
-    #[serde(alias = "uniform-overcast")]
-    UniformOvercast,
-    #[serde(alias = "standard-overcast")]
-    StandardOvercast,
-    Clear,
-}
-
-#[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct SkyTable {
-    pub(super) kind: SkyKind,
+    pub(super) kind: Spanned<String>,
     pub(super) irradiance_W_m2: BTreeMap<String, f64>,
     pub(super) time_utc: Option<TimeText>,
     pub(super) latitude_deg: Option<f64>,
     pub(super) longitude_deg: Option<f64>,
     pub(super) diffuse_fraction: Option<f64>,
+    pub(super) ghi_W_m2: Option<f64>,
 }
 
 /// TOML has dates of its own; quotes around one are as good.

@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::inputs::{LightInput, PatternInput};
-use crate::light::Sky;
+use crate::light::{CieType, Sky, SunnySky};
 use crate::optics::LeafOptics;
 use crate::options::{Diameter, TableFormat, Unit, Up};
 
@@ -111,7 +111,8 @@ fn light_is_a_file_a_file_per_band_or_a_sky() {
         else {
             panic!("expected a sky")
         };
-        let expected = Sky::Clear {
+        let expected = Sky::Sunny {
+            model: SunnySky::Cie(CieType::CLEAR),
             time_utc: "2024-06-21T12:00:00Z".into(),
             latitude_deg: 43.6,
             longitude_deg: 3.9,
@@ -125,6 +126,46 @@ fn light_is_a_file_a_file_per_band_or_a_sky() {
             error,
             "a.toml, line 1: latitude_deg: expected -90 to 90, found 95"
         );
+    }
+}
+
+#[test]
+fn a_sky_may_be_of_any_model() {
+    let sky = |kind: &str, more: &str| {
+        format!(
+            "[light.sky]\nkind = '{kind}'\ntime_utc = 2024-06-21T12:00:00Z\nlatitude_deg = 43.6\n\
+             longitude_deg = 3.9\ndiffuse_fraction = 0.2\n{more}\nirradiance_W_m2 = {{ PAR = 400 }}"
+        )
+    };
+    let model = |text: &str| match parsed(text).light {
+        Some(LightInput::Sky {
+            sky: Sky::Sunny { model, .. },
+            ..
+        }) => model,
+        other => panic!("{other:?}"),
+    };
+    let cie = |number| SunnySky::Cie(CieType::new(number).unwrap());
+    assert_eq!(model(&sky("cie_3", "")), cie(3));
+    assert_eq!(model(&sky("cie-15", "")), cie(15));
+    let global_W_m2 = 812.5;
+    assert_eq!(
+        model(&sky("perez", "ghi_W_m2 = 812.5")),
+        SunnySky::Perez { global_W_m2 }
+    );
+    for (text, expected) in [
+        (sky("perez", ""), "ghi_W_m2, the global irradiance"),
+        (sky("cie_16", ""), "kind of sky: perez, cie-1 to cie-15"),
+        (
+            sky("clear", "ghi_W_m2 = 1"),
+            "ghi_W_m2 with kind = \"perez\" alone",
+        ),
+        (
+            sky("perez", "ghi_W_m2 = 0.5"),
+            "ghi_W_m2: expected 1 to 2000, found 0.5",
+        ),
+        (sky("standard_overcast", ""), "irradiance_W_m2 alone"),
+    ] {
+        assert!(refusal(&text).contains(expected), "{}", refusal(&text));
     }
 }
 
@@ -190,8 +231,8 @@ fn what_is_wrong_is_named_with_its_line() {
             "a.toml, line 2: unknown field `skies`",
         ),
         (
-            "[light.sky]\nkind = 'grey'\n",
-            "a.toml, line 2: unknown variant `grey`",
+            "[light.sky]\nkind = 'grey'\nirradiance_W_m2 = {}\n",
+            "a.toml, line 2: expected kind of sky: perez, cie-1 to cie-15",
         ),
         (
             "[light.sky]\nkind = 'clear'\nirradiance_W_m2 = {}\n",

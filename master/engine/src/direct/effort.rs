@@ -15,11 +15,7 @@ pub fn spread_effort(
     finest_m2: f64,
     (ground_area_m2, leaf_area_m2): (f64, f64),
 ) -> Vec<f64> {
-    let intensity: Vec<f64> = sources
-        .list
-        .iter()
-        .map(|s| s.irradiance_W_m2.iter().sum::<f64>() / -s.direction.z)
-        .collect();
+    let intensity: Vec<f64> = sources.list.iter().map(Source::intensity_W_m2).collect();
     let coarser = coarser(&intensity, sources.sky_directions);
     let wanted: Vec<f64> = sources
         .list

@@ -2,18 +2,21 @@
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, OnceLock, PoisonError};
 
 use glam::DVec3;
+use nestrad_kernel::Tracer;
 
 use super::lit_areas::LitAreas;
 use super::projection::Projection;
 
 /// What directions light, of one frame; of bounded size. What is kept changes no result.
-#[derive(Debug, Default)]
+#[derive(Default)]
 pub struct KeptDirections {
     most_bytes: u64,
     kept: Mutex<Kept>,
+    /// The scene as rays see it, once one was cast.
+    tracer: OnceLock<Tracer>,
 }
 
 #[derive(Debug, Default)]
@@ -53,13 +56,18 @@ impl KeptDirections {
     pub fn within(most_bytes: u64) -> Self {
         Self {
             most_bytes,
-            kept: Mutex::default(),
+            ..Self::default()
         }
     }
 
     /// Bytes that are kept.
     pub fn bytes(&self) -> u64 {
-        self.lock().bytes
+        self.lock().bytes + self.tracer.get().map_or(0, Tracer::bytes)
+    }
+
+    /// What rays are cast in, if that is to stay.
+    pub(super) fn tracer(&self) -> Option<&OnceLock<Tracer>> {
+        (self.most_bytes > 0).then_some(&self.tracer)
     }
 
     /// Another light begins.

@@ -10,6 +10,7 @@
 
 mod areas;
 mod classes;
+mod coloured;
 mod dealing;
 mod effort;
 mod kept;
@@ -22,6 +23,8 @@ mod shares;
 mod sky;
 mod systematic;
 mod tally;
+
+use std::sync::OnceLock;
 
 use nestrad_common::light::{Source, Sources};
 use nestrad_common::optics::Optics;
@@ -37,6 +40,7 @@ use crate::frame::Frame;
 use crate::stop::Stopped;
 use areas::Areas;
 use classes::{Classes, Face};
+use coloured::{Coloured, are_alike};
 use lit_areas::{LitAreas, Scratch};
 use probe::{Probe, Thin};
 use projection::Projection;
@@ -102,27 +106,35 @@ pub fn direct_light_keeping(
             Thin::of(frame, &areas, -source.direction, line_area_m2).count()
         })
     };
-    let probe = Probe::new((&sources.list, line_area_m2), thin, seed);
+    let of_this_light = OnceLock::new();
+    let tracer = kept.tracer().unwrap_or(&of_this_light);
+    let probe = Probe::new((&sources.list, line_area_m2), thin, (tracer, seed));
     kept.next_light();
     let parts: Result<Vec<Direct>, Stopped> = groups(sources)
         .into_par_iter()
         .map(|group| {
             let mut part = Direct::dark(frame, optics);
             let mut scratch = Scratch::new(frame, &classes);
-            for k in group {
-                step()?;
-                let mut rng = stream(seed, Purpose::Direct, k as u64);
-                let source = &sources.list[k];
-                let projection = Projection {
-                    k,
-                    towards: -source.direction,
-                    line_area_m2: line_area_m2[k],
-                    random: rng.random(),
-                };
-                let lit = kept.lit_areas(&projection, seed, probe.is_some(), || {
-                    projection.lit_areas(frame, (&areas, &classes), probe.as_ref(), &mut scratch)
-                });
-                part.add(frame, optics, &lit, source);
+            let mut coloured = Coloured::dark(frame, optics.len());
+            let alike = |&a: &usize, &b: &usize| are_alike(&sources.list[a], &sources.list[b]);
+            for of_colour in group.chunk_by(alike) {
+                for &k in of_colour {
+                    step()?;
+                    let mut rng = stream(seed, Purpose::Direct, k as u64);
+                    let source = &sources.list[k];
+                    let projection = Projection {
+                        k,
+                        towards: -source.direction,
+                        line_area_m2: line_area_m2[k],
+                        random: rng.random(),
+                    };
+                    let lit = kept.lit_areas(&projection, seed, probe.serves(k), || {
+                        projection.lit_areas(frame, (&areas, &classes), &probe, &mut scratch)
+                    });
+                    part.add(frame, optics, &lit, source);
+                    coloured.add(frame, &lit, source);
+                }
+                coloured.pour(frame, optics, &mut part);
             }
             Ok(part)
         })
@@ -187,7 +199,7 @@ impl Direct {
         on.iter().any(|&e| e > 0.0)
     }
 
-    /// Adds the light of a source to what its direction lights.
+    /// Adds what does not go to single rows of the light of a source.
     fn add(&mut self, frame: &Frame, optics: &Optics, lit: &LitAreas, source: &Source) {
         self.lines += lit.lines;
         let bands = optics.len();
@@ -227,38 +239,6 @@ impl Direct {
                     self.incoming_W[b] += intensity * (lit_m2 - shown_m2);
                 }
             }
-            self.add_faces((frame, optics), lit, (b, intensity));
-        }
-    }
-
-    fn add_faces(
-        &mut self,
-        (frame, optics): (&Frame, &Optics),
-        lit: &LitAreas,
-        (b, intensity): (usize, f64),
-    ) {
-        let (bands, band) = (optics.len(), &optics.bands[b]);
-        for face in &lit.faces {
-            let row = face.row as usize;
-            let (element, upper) = (row / 2, row.is_multiple_of(2));
-            self.irradiance_W_m2[row * bands + b] += intensity * face.part;
-            let t = frame.triangle_of_element[element] as usize;
-            let material = &band.materials[frame.material[t] as usize];
-            let of_a_line = intensity * material.absorptance(upper) * lit.line_area_m2;
-            self.element_variance_W2[element * bands + b] +=
-                of_a_line * of_a_line * f64::from(face.variance);
-        }
-        for lit_cell in &lit.soil {
-            let row = frame.ends.soil(lit_cell.cell) as usize;
-            // of the ground
-            let irradiance = intensity * lit.towards.z;
-            self.irradiance_W_m2[row * bands + b] += irradiance * lit_cell.part;
-            self.soil_variance_W2_m4[lit_cell.cell as usize * bands + b] +=
-                irradiance * irradiance * lit_cell.variance;
-        }
-        for shade in &lit.shades {
-            self.shade_W_m2[shade.zone as usize * bands + b] +=
-                intensity * lit.towards.z * shade.part;
         }
     }
 }

@@ -34,7 +34,7 @@ impl Projection {
         &self,
         frame: &Frame,
         (areas, classes): (&Areas, &Classes),
-        probe: Option<&Probe>,
+        probe: &Probe,
         scratch: &mut Scratch,
     ) -> LitAreas {
         let &Self {
@@ -47,7 +47,7 @@ impl Projection {
         let mut missed = 0u64;
         scratch.clear();
         let mut thin = Thin::of(frame, areas, towards, line_area_m2);
-        if probe.is_none() {
+        if !probe.serves(self.k) {
             thin.forget();
         }
         let looking = Looking {
@@ -114,7 +114,7 @@ impl Projection {
             towards,
             line_area_m2: lattice.line_area_m2,
         };
-        if let Some(probe) = probe.filter(|_| thin.any()) {
+        if thin.any() {
             beam.probe(probe, &thin, scratch, &mut lit);
         }
         beam.deal_out(&thin, scratch, &mut lit);

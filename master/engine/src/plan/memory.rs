@@ -123,7 +123,7 @@ impl Sizes {
 
     /// Every group of sources has light and counters of its own.
     fn direct_light(&self) -> Memory {
-        let counters = 4.0 * (self.rows + self.elements) + 40.0 * self.elements;
+        let counters = 4.0 * (self.rows + self.elements) + 40.0 * self.elements + 16.0 * self.rows;
         let of_group = self.direct_bytes() + counters + 1500.0 * self.organs + (2 << 20) as f64;
         self.at([0.0, self.direct_bytes() + self.groups * of_group])
     }

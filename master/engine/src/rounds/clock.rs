@@ -4,7 +4,7 @@ use std::sync::mpsc::{self, RecvTimeoutError, Sender};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-use super::work::all_s;
+use super::work::Takes;
 use crate::lit_canopy::LitCanopy;
 use crate::plan::Plan;
 use crate::stop::Stop;
@@ -13,18 +13,22 @@ use crate::stop::Stop;
 pub(super) struct Clock {
     begun: Instant,
     budget_s: f64,
-    /// What a second takes here that is reckoned for one core, s.
-    slower: f64,
+    /// What a second takes here that is reckoned for one core, s: of the exchange, of direct light, of the rest.
+    slower: Takes,
 }
 
 /// A round is planned to take this part of the time that is left at most: what it takes is not known better.
 const SAFE: f64 = 0.85;
 
 /// The first one this part, because this machine is not known yet.
-const SAFE_AT_FIRST: f64 = 0.4;
+const SAFE_AT_FIRST: f64 = 0.45;
 
-/// After this part of the budget, a first round that is not done gives way to a much quicker one.
-const GIVES_WAY: f64 = 0.6;
+/// Where there is no time for another, a first round is refused that may take so many times as long as it should.
+const UNSURE: f64 = 1.5;
+
+/// A first round that is not done gives way to a much quicker one when there is time for that one, within these parts
+/// of the budget.
+const GIVES_WAY: [f64; 2] = [0.4, 0.8];
 
 /// What the first round may overrun the budget by: parts of it, or seconds where that is more.
 const OVERRUN: f64 = 0.08;
@@ -32,10 +36,15 @@ const OVERRUN_S: f64 = 0.35;
 
 impl Clock {
     pub(super) fn start(budget_s: f64) -> Self {
+        let slower = 1.0 / rayon::current_num_threads() as f64;
         Self {
             begun: Instant::now(),
             budget_s,
-            slower: 1.0 / rayon::current_num_threads() as f64,
+            slower: Takes {
+                trace_s: slower,
+                light_s: slower,
+                rest_s: slower,
+            },
         }
     }
 
@@ -47,35 +56,60 @@ impl Clock {
         self.left_s() <= 0.0
     }
 
-    /// What a plan should take, s.
-    pub(super) fn takes_s(&self, lit: &LitCanopy, plan: &Plan) -> f64 {
-        self.slower * all_s(lit, plan)
+    /// What should take so long on one core takes here, s.
+    pub(super) fn takes_s(&self, takes: Takes) -> f64 {
+        self.slower.trace_s * takes.trace_s
+            + self.slower.light_s * takes.light_s
+            + self.slower.rest_s * takes.rest_s
     }
 
     /// Whether a plan should be done in time.
-    pub(super) fn allows(&self, lit: &LitCanopy, plan: &Plan) -> bool {
-        self.takes_s(lit, plan) <= SAFE * self.left_s()
+    pub(super) fn allows(&self, takes: Takes) -> bool {
+        self.takes_s(takes) <= SAFE * self.left_s()
     }
 
     /// Whether a first plan leaves time for another.
     pub(super) fn allows_first(&self, lit: &LitCanopy, plan: &Plan) -> bool {
-        self.takes_s(lit, plan) <= SAFE_AT_FIRST * self.left_s()
+        self.takes_s(Takes::of(lit, plan)) <= SAFE_AT_FIRST * self.left_s()
     }
 
     /// Whether a first plan that cannot be coarser should be done in time.
     pub(super) fn allows_coarsest(&self, lit: &LitCanopy, plan: &Plan) -> bool {
-        self.takes_s(lit, plan) <= self.left_s()
+        UNSURE * self.takes_s(Takes::of(lit, plan)) <= self.left_s()
     }
 
-    /// Learns from a round what this machine takes.
-    pub(super) fn learn(&mut self, lit: &LitCanopy, plan: &Plan, took_s: f64) {
-        self.slower = took_s / all_s(lit, plan).max(f64::MIN_POSITIVE);
+    /// Learns what this machine takes, from a round that should take so long on one core.
+    pub(super) fn learn(&mut self, should: Takes, took: Takes) {
+        let learnt = |slower: &mut f64, should_s: f64, took_s: f64| {
+            if should_s > 0.0 && took_s > 0.0 {
+                *slower = took_s / should_s;
+            }
+        };
+        learnt(&mut self.slower.trace_s, should.trace_s, took.trace_s);
+        learnt(&mut self.slower.light_s, should.light_s, took.light_s);
+        learnt(&mut self.slower.rest_s, should.rest_s, took.rest_s);
+    }
+
+    /// Learns from a round that was stopped how slow this machine is at least.
+    pub(super) fn learn_at_least(&mut self, should: Takes, took_s: f64) {
+        let slower = took_s / self.takes_s(should).max(f64::MIN_POSITIVE);
+        let Takes {
+            trace_s,
+            light_s,
+            rest_s,
+        } = &mut self.slower;
+        for part in [trace_s, light_s, rest_s] {
+            *part *= slower.max(1.0);
+        }
     }
 
     /// Stops a round that is not done in time.
     pub(super) fn alarm(&self, until: Until, stop: &Stop) -> Option<Alarm> {
         let end_s = match until {
-            Until::GivesWay => GIVES_WAY * self.budget_s,
+            Until::GivesWay { to } => {
+                let [early, late] = GIVES_WAY.map(|part| part * self.budget_s);
+                (self.budget_s - UNSURE * self.takes_s(to)).clamp(early, late)
+            }
             Until::End => self.budget_s,
             Until::PastTheEnd => self.budget_s + (OVERRUN * self.budget_s).max(OVERRUN_S),
         };
@@ -86,10 +120,10 @@ impl Clock {
 }
 
 /// How long a round may go on.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Until {
-    /// A quicker one can still be done.
-    GivesWay,
+    /// A quicker one, which takes so long on one core, can still be done.
+    GivesWay { to: Takes },
     /// The time that the user allows is over.
     End,
     /// The same and a bit more: without this round there is nothing.

@@ -5,9 +5,9 @@ use nestrad_common::scene::Scene;
 
 use super::clock::Clock;
 use super::limits::Planned;
-use super::work::{all_s, work_s};
+use super::work::{Takes, work_s};
 use super::{lit_canopy, sources_for};
-use crate::plan::{Aims, Plan, PlanError, Settings, WorkCounts};
+use crate::plan::{Aims, LEAST_ACCURACY_PERCENT, Plan, PlanError, Settings, WorkCounts};
 
 /// A coarse look comes first where it takes less than this part of what is planned without one.
 const WORTH_A_LOOK: f64 = 0.2;
@@ -45,36 +45,59 @@ pub(super) fn first(
     }
 }
 
-/// Where time is short, a coarse look comes first always; where not even that leaves time for more, a coarser one.
+/// Where time is short: what is asked for where that should take half of the time, else the finest plan that should.
+/// It leaves time for another, which is planned by what this one measures.
 fn in_time(scene: &Scene, settings: &Settings, clock: &Clock) -> Result<Planned, PlanError> {
-    let pilot = Aims::pilot(settings.accuracy_percent);
+    let asked = settings.accuracy_percent;
     let planned = |aims: &Aims| planned(scene, settings, aims);
     let allows = |(sources, plan): &Planned| clock.allows_first(&lit_canopy(scene, sources), plan);
-    let look = planned(&pilot)?;
+    let wanted = planned(&Aims::of(asked))?;
+    if allows(&wanted) {
+        return Ok(wanted);
+    }
+    let look = planned(&Aims::pilot(asked))?;
     if allows(&look) {
-        return Ok(look);
+        // the same steps whatever is asked for, so that who asks for more is not given less
+        let step =
+            |part: f64| COARSE_PERCENT * (LEAST_ACCURACY_PERCENT / COARSE_PERCENT).powf(part);
+        return finest(look, allows, |part| {
+            planned(&Aims::of(step(part).max(asked)))
+        });
     }
-    let mut best = quickest(scene, settings)?;
-    if !allows(&best) {
-        let (sources, plan) = &best;
-        let lit = lit_canopy(scene, sources);
-        return if clock.allows_coarsest(&lit, plan) {
-            Ok(best)
-        } else {
-            Err(PlanError::Time {
-                needed_s: clock.takes_s(&lit, plan),
-                limit_s: settings.budget_s.unwrap_or_default(),
-            })
-        };
+    let best = quickest(scene, settings)?;
+    if allows(&best) {
+        let pilot = Aims::pilot(asked);
+        return finest(best, allows, |part| {
+            planned(&pilot.quicker(QUICKEST.powf(1.0 - part)))
+        });
     }
+    let (sources, plan) = &best;
+    let lit = lit_canopy(scene, sources);
+    if clock.allows_coarsest(&lit, plan) {
+        Ok(best)
+    } else {
+        Err(PlanError::Time {
+            needed_s: clock.takes_s(Takes::of(&lit, plan)),
+            limit_s: settings.budget_s.unwrap_or_default(),
+        })
+    }
+}
+
+/// The last plan of a row, from the coarsest at 0 to the finest at 1, that is allowed; the first one is.
+fn finest(
+    coarsest: Planned,
+    allows: impl Fn(&Planned) -> bool,
+    planned: impl Fn(f64) -> Result<Planned, PlanError>,
+) -> Result<Planned, PlanError> {
     let (mut low, mut high) = (0.0, 1.0);
+    let mut best = coarsest;
     for _ in 0..HALVINGS {
         let middle = 0.5 * (low + high);
-        let tried = planned(&pilot.quicker(QUICKEST.powf(middle)))?;
+        let tried = planned(middle)?;
         if allows(&tried) {
-            (best, high) = (tried, middle);
+            (best, low) = (tried, middle);
         } else {
-            low = middle;
+            high = middle;
         }
     }
     Ok(best)
@@ -100,16 +123,19 @@ pub(super) fn in_place_of(
     settings: &Settings,
 ) -> Option<Planned> {
     let quickest = quickest(scene, settings).ok()?;
-    let takes_s = |sources, plan| all_s(&lit_canopy(scene, sources), plan);
+    let takes_s = |sources, plan| Takes::of(&lit_canopy(scene, sources), plan).all_s();
     let is_quicker = takes_s(&quickest.0, &quickest.1) < MUCH_QUICKER * takes_s(sources, plan);
     is_quicker.then_some(quickest)
 }
 
 /// Part of a plan's time that a much quicker one takes at most.
-const MUCH_QUICKER: f64 = 0.5;
+const MUCH_QUICKER: f64 = 0.6;
 
 /// No look is coarser than another by more than this.
 const QUICKEST: f64 = 20.0;
 
-/// Halvings of the way to it.
-const HALVINGS: usize = 6;
+/// A look is not coarser than for this error, percent, where there is time.
+const COARSE_PERCENT: f64 = 2.0;
+
+/// Halvings of the way: a plan takes time, too.
+const HALVINGS: usize = 5;

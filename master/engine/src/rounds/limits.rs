@@ -6,8 +6,9 @@ use nestrad_common::scene::Scene;
 use super::accuracy::worst;
 use super::clock::Clock;
 use super::next::Measured;
-use super::work::PerPart;
+use super::work::{PerPart, Takes};
 use super::{Ended, lit_canopy, sources_for};
+use crate::lit_canopy::LitCanopy;
 use crate::plan::{Aims, Plan, PlanError, Settings};
 use crate::solution::BandAccount;
 
@@ -133,12 +134,22 @@ impl Choice<'_> {
             Plan::aimed(&lit, self.settings, aims)
         };
         match plan {
-            Ok(plan) if self.clock.is_none_or(|clock| clock.allows(&lit, &plan)) => {
-                Ok((sources, plan))
-            }
+            Ok(plan) if self.is_in_time(&lit, &plan) => Ok((sources, plan)),
             Ok(_) => Err(Unfit::Time),
             Err(PlanError::Memory { .. } | PlanError::Elements { .. }) => Err(Unfit::Memory),
             Err(_) => Err(Unfit::Other),
         }
+    }
+
+    fn is_in_time(&self, lit: &LitCanopy, plan: &Plan) -> bool {
+        let Some(clock) = self.clock else {
+            return true;
+        };
+        let takes = Takes::of(lit, plan);
+        clock.allows(if plan.trace == self.last.1.trace {
+            takes.traced()
+        } else {
+            takes
+        })
     }
 }

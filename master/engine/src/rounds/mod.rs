@@ -35,7 +35,7 @@ use clock::{Clock, Until};
 use first::{first, in_place_of};
 use limits::Choice;
 use next::Measured;
-use work::{PARTS, work_s};
+use work::{PARTS, Takes, work_s};
 
 /// The last round, and how it came to it.
 #[derive(Clone, Debug)]
@@ -161,13 +161,15 @@ fn rounds(
         begins(&plan, &rounds);
         watch.lap("plan");
         run.stop.check().map_err(SolveError::from)?;
-        let round_begun = Instant::now();
+        let (round_begun, stages_before) = (Instant::now(), watch.stages().len());
         let lit = lit_canopy(scene, &sources);
         let canopy = (&scene.canopy, settings);
         let in_time = run.stop.part();
         let until = match (&best, &instead) {
             (Some(_), _) => Until::End,
-            (None, Some(_)) => Until::GivesWay,
+            (None, Some((sources, plan))) => Until::GivesWay {
+                to: Takes::of(&lit_canopy(scene, sources), plan),
+            },
             (None, None) => Until::PastTheEnd,
         };
         let alarm = clock.as_ref().and_then(|c| c.alarm(until, &in_time));
@@ -198,7 +200,7 @@ fn rounds(
             (Err(SolveError::Stopped(_)), None) => {
                 let needed_s = round_begun.elapsed().as_secs_f64();
                 if let (Some(quicker), Some(clock)) = (instead.take(), clock.as_mut()) {
-                    clock.learn(&lit, &plan, needed_s);
+                    clock.learn_at_least(Takes::of(&lit, &plan), needed_s);
                     (sources, plan) = quicker;
                     best = None;
                     continue;
@@ -212,9 +214,14 @@ fn rounds(
                 return Ok(before);
             }
         };
-        // what was lit again by rows that were there tells nothing of others
-        if let Some(clock) = clock.as_mut().filter(|_| work.jobs.traced > 0) {
-            clock.learn(&lit, &plan, round_begun.elapsed().as_secs_f64());
+        if let Some(clock) = clock.as_mut() {
+            let (should, took) = (
+                Takes::of(&lit, &plan),
+                Takes::of_stages(&watch.stages()[stages_before..]),
+            );
+            // rows that were there tell nothing of what others take
+            let is_traced = work.jobs.traced == 0;
+            clock.learn(if is_traced { should.traced() } else { should }, took);
         }
         let reached_percent = worst(&solution.account).map(BandAccount::total_percent);
         rounds.push(Round {

@@ -35,6 +35,9 @@ const MOST_FINER: PerPart = [10.0, 10.0, 10.0, 3.5, 3.5];
 /// aimed at, which is all that was asked of it.
 const LEAST_LEFT: f64 = 0.3;
 
+/// Parts that are not of what is traced: where the others stay, nothing is traced again.
+const OF_LIGHT: [bool; PARTS] = [false, true, true, false, false];
+
 impl Measured<'_> {
     /// By how much each part has to err less; none where no plan helps, because what cannot be planned for is nearly
     /// all that is left.
@@ -72,8 +75,20 @@ impl Measured<'_> {
         if !misses {
             return None;
         }
-        let factors = allot(&bands, &self.cost_s);
+        let all = allot(&bands, &self.cost_s);
+        let factors = match allot_to_light(&bands, &self.cost_s) {
+            Some(light) if self.takes_s(&light, OF_LIGHT) < self.takes_s(&all, [true; PARTS]) => {
+                light
+            }
+            _ => all,
+        };
         Some(std::array::from_fn(|k| factors[k].max(1.0 / MOST_FINER[k])))
+    }
+
+    /// What parts take that err less by these factors, s.
+    fn takes_s(&self, finer: &PerPart, parts: [bool; PARTS]) -> f64 {
+        let of = |k: usize| self.cost_s[k] / (finer[k] * finer[k]);
+        (0..PARTS).filter(|&k| parts[k]).map(of).sum()
     }
 
     /// The parts that can be planned for.
@@ -203,6 +218,28 @@ fn allot(bands: &[PerPart], cost_s: &PerPart) -> PerPart {
     squares.map(|s| (s / most).sqrt())
 }
 
+/// The same where what was traced stays as it is; none where it errs too much for that.
+fn allot_to_light(bands: &[PerPart], cost_s: &PerPart) -> Option<PerPart> {
+    let mut of_light = Vec::new();
+    for band in bands {
+        let sum = |light: bool| -> f64 {
+            let parts = band.iter().zip(OF_LIGHT);
+            parts.filter(|(_, is)| *is == light).map(|(e, _)| e).sum()
+        };
+        let room = 1.0 - sum(false);
+        if room <= 0.0 {
+            return None;
+        }
+        of_light.push(std::array::from_fn(|k| {
+            if OF_LIGHT[k] { band[k] / room } else { 0.0 }
+        }));
+    }
+    let factors = allot(&of_light, cost_s);
+    Some(std::array::from_fn(|k| {
+        if OF_LIGHT[k] { factors[k] } else { 1.0 }
+    }))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -252,6 +289,22 @@ mod tests {
         }
         assert!(finer.iter().all(|&s| s <= 1.0), "{finer:?}");
         assert_eq!(finer[2], 1.0);
+    }
+
+    /// The exchange was made a little finer, and so traced again, where direct light alone was coarse.
+    #[test]
+    fn fault_what_was_traced_fine_enough_was_traced_again() {
+        let errors = [parts([0.3, 4.0, 0.0, 0.48, 0.04])];
+        let measured = Measured {
+            cost_s: [3.0, 0.1, 0.0, 1.4, 0.0],
+            ..measured(&errors)
+        };
+        let finer = measured.finer(0.9).unwrap();
+        let kept = [finer[0], finer[3], finer[4]];
+        assert!(kept == [1.0; 3] && finer[1] < 0.2, "{finer:?}");
+        assert!(measured.aims(&finer).trace_as(&measured.aims));
+        // where it errs too much, it is
+        assert!(measured.finer(0.5).is_some_and(|finer| finer[3] < 1.0));
     }
 
     #[test]

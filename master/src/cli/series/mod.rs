@@ -15,12 +15,13 @@ use jiff::SignedDuration;
 use jiff::civil::Date;
 use nestrad_common::assemble::load_weather;
 use nestrad_common::formats::weather::Weather;
+use nestrad_common::light::SkyModel;
 use nestrad_common::options::{Diameter, Options, TableFormat};
-use nestrad_common::weather::{Day, SKY_NAMES, Site, SkyModel};
+use nestrad_common::weather::{Day, Site};
 use nestrad_engine::plan::Estimator;
 
 use super::console::Notes;
-use super::flags::{CanopyFlags, named_number, once};
+use super::flags::{CanopyFlags, named_number, once, sky_model};
 use super::numbers::{number, positive, whole};
 use super::pool::pool;
 use super::settings::settings;
@@ -94,7 +95,7 @@ struct SiteFlags {
     longitude: f64,
 
     /// How diffuse light is distributed: perez, cie-1 to cie-15, clear (cie-12), standard-overcast or uniform-overcast
-    #[arg(long, value_name = "SKY", value_parser = sky)]
+    #[arg(long, value_name = "SKY", value_parser = sky_model)]
     sky: SkyModel,
 
     /// Which part of broadband irradiance a band gets, direct and diffuse alike; once for each band
@@ -238,8 +239,4 @@ fn within(text: &str, low: f64, high: f64) -> Result<f64, String> {
     } else {
         Err(format!("expected {low} to {high}"))
     }
-}
-
-fn sky(text: &str) -> Result<SkyModel, String> {
-    text.parse().map_err(|_| format!("expected {SKY_NAMES}"))
 }

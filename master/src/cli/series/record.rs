@@ -1,8 +1,9 @@
 //! The options of a series as its summary keeps them, defaults included.
 
 use nestrad_common::inputs::{Inputs, PatternInput};
+use nestrad_common::light::SkyModel;
 use nestrad_common::options::{Diameter, TableFormat, Unit, Up};
-use nestrad_common::weather::{Site, SkyModel};
+use nestrad_common::weather::Site;
 use nestrad_engine::plan::Settings;
 use serde::Serialize;
 

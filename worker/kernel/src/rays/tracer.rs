@@ -36,6 +36,11 @@ impl Tracer {
         }
     }
 
+    /// Bytes that they take.
+    pub fn bytes(&self) -> u64 {
+        self.all.bytes() + self.solids.as_ref().map_or(0, |solids| solids.tree.bytes())
+    }
+
     /// Whether a point of a triangle and element sees the sky in a direction that points up, however far away
     /// that is. The block is a whole scene.
     pub fn sees_sky(

@@ -77,6 +77,17 @@ const ROUNDING: f64 = 12.0 * 0.5 * f64::EPSILON;
 const MOST_PATTERNS: usize = 100_000;
 
 impl Tree {
+    /// Bytes that it takes.
+    pub(super) fn bytes(&self) -> u64 {
+        let of = |list: usize, item: usize| (list * item) as u64;
+        size_of_val(&self.bvh.nodes[..]) as u64
+            + of(
+                self.first_member.len() + self.bvh.primitive_indices.len(),
+                4,
+            )
+            + of(self.members.len(), size_of::<Member>())
+    }
+
     /// Builds the tree over those triangles of the block that `keep` holds of and, with a pattern, over those
     /// copies of them that reach into it.
     pub(super) fn of(block: &Block, keep: impl Fn(usize) -> bool) -> Self {
