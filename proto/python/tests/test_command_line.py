@@ -72,8 +72,8 @@ def test_the_numbers_are_those_of_the_command_line(tmp_path, accuracy):
     organs, triangles, _ = of_command_line(write_scene(tmp_path, canopy, light), *options)
     found = nestrad.solve(canopy, OPTICS, nestrad.sun(SUN[1], direction=SUN[0]), accuracy=accuracy)
     for theirs, ours, columns in (
-        (organs, found.organs, nestrad.OrganTable._per_band),
-        (triangles, found.triangles, nestrad.TriangleTable._per_band),
+        (organs, found.organs, nestrad.OrganTable.per_band),
+        (triangles, found.triangles, nestrad.TriangleTable.per_band),
     ):
         for name in columns:
             assert theirs[name].tolist() == nine_digits(getattr(ours, name)), name

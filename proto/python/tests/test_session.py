@@ -87,7 +87,7 @@ def test_https_with_an_authority_and_a_certificate(canopy, sun, tmp_path):
                 assert len(session.solve(canopy, OPTICS, sun, accuracy=5).organs) == 20
 
 
-def test_a_master_that_was_started_again_gets_the_canopy_again(canopy, sun):
+def test_a_master_that_was_started_again_gets_the_canopy_again(canopy, sun, caplog):
     with Served() as first:
         target = first.target
         session = nestrad.Session(first.address)
@@ -96,6 +96,7 @@ def test_a_master_that_was_started_again_gets_the_canopy_again(canopy, sun):
     with session, Served(listen=target):
         after = resident.solve(sun, accuracy=2)
     assert (before.triangles.absorbed_W_m2 == after.triangles.absorbed_W_m2).all()
+    assert all("trying again" in record.message for record in caplog.records)
 
 
 def test_a_solve_outlives_a_master_that_is_killed_meanwhile(canopy, sun):

@@ -1,7 +1,8 @@
 """From arrays to arrays."""
 
-import builtins
 import sys
+import time
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from conftest import OPTICS, ribbons, small_canopy
 
 import nestrad
 from nestrad import InputError, LimitError
+from nestrad.progress import Bar
 
 
 @pytest.fixture(scope="module")
@@ -140,22 +142,25 @@ def test_progress_comes_to_a_function(canopy, sun):
 
 
 @pytest.mark.parametrize("has_tqdm", [True, False])
-def test_progress_is_shown_and_taken_away(canopy, sun, capfd, monkeypatch, has_tqdm):
-    if not has_tqdm:
-        usual = builtins.__import__
-
-        def without(name, *args, **kwargs):
-            if name.startswith("tqdm"):
-                raise ImportError(name)
-            return usual(name, *args, **kwargs)
-
-        monkeypatch.setattr(builtins, "__import__", without)
-    else:
+def test_progress_is_shown_and_taken_away(capfd, monkeypatch, has_tqdm):
+    if has_tqdm:
         pytest.importorskip("tqdm")
-    nestrad.solve(canopy, OPTICS, sun, accuracy=0.5, progress=True)
+    else:
+        # Python takes this for a package that is not there
+        monkeypatch.setitem(sys.modules, "tqdm.auto", None)
+    messages = [("", 0, 0, 2), ("plan", 0, 0, 0), *(("exchange", done, 9, 0) for done in range(10))]
+    with Bar(True) as bar:
+        for stage, done, total, ahead in messages:
+            bar.says(SimpleNamespace(stage=stage, done=done, total=total, ahead=ahead, plan=[]))
+            if has_tqdm:
+                # which shows nothing before
+                time.sleep(0.05)
     shown = capfd.readouterr().err
-    assert "\r" in shown or has_tqdm
-    assert not shown or shown.endswith("\r")
+    assert shown.endswith("\r")
+    assert "exchange" in shown
+    if not has_tqdm:
+        for text in ("2 solves before this one", "plan", "exchange 9/9"):
+            assert text in shown
 
 
 def test_nothing_is_shown_where_nobody_looks(canopy, sun, capfd):

@@ -54,7 +54,7 @@ def triangles(fetch: Fetch, canopy: Canopy, bands: Sequence[str]) -> TriangleTab
     """The light of triangles, per m2."""
     table = empty_triangles(canopy, bands)
     # what comes in W goes out per m2
-    columns = [getattr(table, name) for name in TriangleTable._per_band]
+    columns = [getattr(table, name) for name in TriangleTable.per_band]
     at = 0
     for content in _contents(fetch, "triangles"):
         first, area_m2, light = _triangle_slice(content)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 import time
@@ -10,6 +11,7 @@ from contextlib import suppress
 from typing import Any
 
 import grpc
+from google.protobuf.message import DecodeError
 
 from . import fetching, protocol, upload
 from .calls import Away, Busy, Calls, Forgotten, of_rpc
@@ -69,6 +71,7 @@ class Solve:
         self._busy_since: float | None = None
         self._rounds = 0
         self._short = 0
+        self._noted = False
         self._told: Any = None
         self._warnings: tuple[str, ...] = ()
         self._plan: tuple[str, ...] = ()
@@ -90,6 +93,7 @@ class Solve:
                     lost = self._rounds > _MOST_ROUNDS or self._short > _MOST_SHORT
                     if lost or time.monotonic() - since > patience:
                         raise MasterError(str(error)) from None
+                    self._note(f"{error}: trying again")
                     time.sleep(_PAUSE_S)
         except BaseException:
             self._cancel()
@@ -116,7 +120,14 @@ class Solve:
         wait_s = min(busy.retry_after_s, _LONGEST_PAUSE_S)
         if now - since + wait_s > _BUSY_PATIENCE_S:
             raise LimitError(f"{busy}; the master had no room for {now - since:.0f} s") from None
+        self._note(f"the master has no room ({busy}): trying again for {_BUSY_PATIENCE_S / 60:.0f} minutes")
         time.sleep(wait_s)
+
+    def _note(self, note: str) -> None:
+        """Says once why it takes so long."""
+        if not self._noted:
+            self._noted = True
+            logging.getLogger("nestrad").warning(note)
 
     def _upload(self) -> str:
         resident = self._resident
@@ -139,6 +150,7 @@ class Solve:
     def _watch(self, bar: Bar) -> None:
         request = protocol.WatchSolveRequest(solve_id=self._solve_id)
         begun, news = time.monotonic(), False
+        self._plan = ()
         try:
             for message in _interruptible(self._calls.WatchSolve(request)):
                 now = (message.state, message.stage, message.done, message.total, message.ahead)
@@ -185,7 +197,9 @@ class Solve:
             of_triangles = fetching.triangles(fetch, canopy, bands) if triangles else None
             soil = fetching.soil(fetch, bands)
             summary = fetching.summary(fetch)
-        except ValueError as error:
+        except NestradError:
+            raise
+        except (ValueError, DecodeError) as error:
             raise MasterError(f"the master sent what cannot be read: {error}") from None
         finally:
             for call in calls.values():

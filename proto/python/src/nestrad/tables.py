@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -28,16 +28,17 @@ class Table:
     _rows_are = "row"
     _labels: tuple[str, ...] = ()
     _per_row: tuple[str, ...] = ()
-    _per_band: tuple[str, ...] = ()
+    #: the names of the columns with a value per band
+    per_band: ClassVar[tuple[str, ...]] = ()
 
     def __len__(self) -> int:
         """The number of rows."""
-        return len(getattr(self, self._per_band[0]))
+        return len(getattr(self, self.per_band[0]))
 
     def band(self, name: str) -> dict[str, Floats]:
         """The columns of one band, (rows,) each."""
         number = _band(self.bands, name)
-        return {column: getattr(self, column)[:, number] for column in self._per_band}
+        return {column: getattr(self, column)[:, number] for column in self.per_band}
 
     def to_pandas(self) -> pd.DataFrame:
         """One line per row and band. Needs pandas."""
@@ -49,7 +50,7 @@ class Table:
         for name in (*self._labels, *self._per_row):
             columns[name] = np.repeat(np.asarray(getattr(self, name)), count)
         columns["band"] = np.tile(np.array(self.bands), len(self))
-        for name in self._per_band:
+        for name in self.per_band:
             columns[name] = getattr(self, name).reshape(-1)
         frame: pd.DataFrame = pandas.DataFrame(columns)
         return frame
@@ -58,7 +59,7 @@ class Table:
         """A data set with the dimensions row and band, and units as attributes. Needs xarray."""
         xarray = package("xarray")
         rows = self._rows_are
-        data: dict[str, Any] = {name: ((rows, "band"), getattr(self, name)) for name in self._per_band}
+        data: dict[str, Any] = {name: ((rows, "band"), getattr(self, name)) for name in self.per_band}
         data |= {name: ((rows,), getattr(self, name)) for name in self._per_row}
         labels = {name: ((rows,), getattr(self, name)) for name in self._labels if name != rows}
         own = getattr(self, rows) if rows in self._labels else np.arange(len(self))
@@ -70,7 +71,7 @@ class Table:
         return found
 
     def __repr__(self) -> str:
-        columns = ", ".join((*self._labels, *self._per_row, *self._per_band))
+        columns = ", ".join((*self._labels, *self._per_row, *self.per_band))
         return f"<{type(self).__name__}: {len(self)} rows, bands {', '.join(self.bands)}; {columns}>"
 
 
@@ -100,7 +101,7 @@ class OrganTable(Table):
     _rows_are = "organ"
     _labels = ("species", "plant", "organ", "kind")
     _per_row = ("area_m2",)
-    _per_band = (
+    per_band: ClassVar[tuple[str, ...]] = (
         "irradiance_upper_W_m2",
         "irradiance_lower_W_m2",
         "absorbed_W",
@@ -133,7 +134,7 @@ class TriangleTable(Table):
     _rows_are = "triangle"
     _labels = ("species", "plant", "organ", "kind")
     _per_row = ("area_m2",)
-    _per_band = (
+    per_band: ClassVar[tuple[str, ...]] = (
         "irradiance_upper_W_m2",
         "irradiance_lower_W_m2",
         "absorbed_W_m2",
@@ -188,7 +189,7 @@ class SoilTable(Table):
 
     _rows_are = "cell"
     _per_row = ("x_m", "y_m")
-    _per_band = ("irradiance_W_m2", "irradiance_se_W_m2")
+    per_band: ClassVar[tuple[str, ...]] = ("irradiance_W_m2", "irradiance_se_W_m2")
 
     def map_W_m2(self, band: str) -> Floats:
         """The irradiance of a band as a map, (cells_y, cells_x)."""
@@ -199,7 +200,7 @@ class SoilTable(Table):
 def empty_organs(canopy: Canopy, bands: Sequence[str]) -> OrganTable:
     """A table to be filled."""
     rows, shape = len(canopy.organ), (len(canopy.organ), len(bands))
-    columns = (np.zeros(shape) for _ in OrganTable._per_band)
+    columns = (np.zeros(shape) for _ in OrganTable.per_band)
     names = (canopy.species, canopy.plant, canopy.organ, canopy.organ_kinds())
     return OrganTable(tuple(bands), *names, np.zeros(rows), *columns)
 
@@ -207,7 +208,7 @@ def empty_organs(canopy: Canopy, bands: Sequence[str]) -> OrganTable:
 def empty_triangles(canopy: Canopy, bands: Sequence[str]) -> TriangleTable:
     """A table to be filled."""
     shape = (len(canopy), len(bands))
-    columns = (np.zeros(shape) for _ in TriangleTable._per_band)
+    columns = (np.zeros(shape) for _ in TriangleTable.per_band)
     return TriangleTable(tuple(bands), canopy, np.zeros(len(canopy)), *columns)
 
 
