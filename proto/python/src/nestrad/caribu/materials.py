@@ -66,7 +66,10 @@ class Materials:
         """The four values of each triangle, (n, 4)."""
         return np.array(self.values[band], np.float64).reshape(-1, 4)[self.of_triangle]
 
-    def label(self, number: int) -> str:
-        """A label as CAN files have it: the material counts as species, and leaf 0 is opaque."""
-        leaf = int(any(values[number][1] or values[number][3] for values in self.values.values()))
-        return f"{number + 1}00001{leaf:03d}000"
+    def labels(self) -> list[str]:
+        """The label of each material as CAN files have it: the material counts as species, and leaf 0 is opaque."""
+        found = []
+        for number, of_bands in enumerate(zip(*self.values.values()), 1):
+            leaf = int(any(upper or lower for _, upper, _, lower in of_bands))
+            found.append(f"{number}00001{leaf:03d}000")
+        return found

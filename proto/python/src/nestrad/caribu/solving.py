@@ -133,7 +133,8 @@ def _light(lights: Sequence[Any]) -> Light | None:
 
 
 def _columns(scene: Scene, found: dict[str, tuple[TriangleTable | None, int] | None]) -> dict[str, Columns]:
-    labels = [scene.materials.label(number) for number in scene.materials.of_triangle.tolist()]
+    of_materials = scene.materials.labels()
+    labels = [of_materials[number] for number in scene.materials.of_triangle.tolist()]
     area = areas(scene.triangles)
     result = {}
     for band in scene.materials.bands:
