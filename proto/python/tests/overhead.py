@@ -6,7 +6,6 @@ Processor time of this process and of the master, and the most memory of this pr
 from __future__ import annotations
 
 import os
-import resource
 import sys
 import time
 
@@ -39,8 +38,16 @@ def master_cpu_s(process: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def peak_bytes() -> int:
-    return 1024 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+def resident_bytes(what: str) -> int:
+    """What this process holds now (VmRSS), or held at most since it was last asked to forget (VmHWM)."""
+    with open("/proc/self/status") as status:
+        (line,) = (line for line in status if line.startswith(what))
+    return 1024 * int(line.split()[1])
+
+
+def forget_peak() -> None:
+    with open("/proc/self/clear_refs", "w") as clear:
+        clear.write("5")
 
 
 def main() -> None:
@@ -52,13 +59,14 @@ def main() -> None:
         master = session._own.process_id
         warm = nestrad.Canopy(vertices[:4000], triangles[:1000], pattern=(0, 0, side, side), soil_z=0.0)
         session.solve(warm, optics, nestrad.sky(100), accuracy=20)
-        peak, own, others = peak_bytes(), time.process_time(), master_cpu_s(master)
+        forget_peak()
+        before, own, others = resident_bytes("VmRSS"), time.process_time(), master_cpu_s(master)
         begun = time.monotonic()
         canopy = nestrad.Canopy(vertices, triangles, organ=organ, pattern=(0, 0, side, side), soil_z=0.0)
         found = session.solve(canopy, optics, nestrad.sun(300, elevation=50) + nestrad.sky(100), progress=False)
         wall_s = time.monotonic() - begun
         own, others = time.process_time() - own, master_cpu_s(master) - others
-    taken = peak_bytes() - peak
+    taken = resident_bytes("VmHWM") - before
     given = sum(array.nbytes for array in (vertices, triangles, organ))
     got = sum(
         value.nbytes

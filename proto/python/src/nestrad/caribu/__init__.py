@@ -11,6 +11,7 @@ you give per m2 of ground comes out per m2 of leaf. What is different:
 * `screen_size`, `screen_resolution`, `layers`, `height`, `debug`, `filecache`, `canfile` and `optfile` do nothing:
   nestrad plans by accuracy, and its far field follows from the scene.
 * `d_sphere = 0` (layers alone) is solved on the true geometry.
+* Light straight from the sources has an error of 0.3 % (rms over ids), scattered light one of about 0.5 %.
 * Without a soil mesh the ground of an infinite scene is a plane at `z_soil`; by default at 0, or at the lowest point of
   a scene that reaches below.
 * Virtual sensors are not there yet: `sensors` raises NotImplementedError.

@@ -24,8 +24,8 @@ Columns = dict[str, list[Any]]
 # the least sine of the elevation of a source
 _LEAST_SINE = 1e-4
 _BLACK = "black"
-# light straight from the sources costs little
-_FIRST_ORDER_PERCENT = 0.1
+# finer than the default, as light straight from the sources costs little
+_FIRST_ORDER_PERCENT = 0.3
 
 
 @dataclass(frozen=True)
