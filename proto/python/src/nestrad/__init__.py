@@ -25,7 +25,7 @@ from .light import Light, Sky, Sources, sky, sources, sun
 from .progress import Progress
 from .results import Balance, BandBalance, CanopyLight, Cost, Quantity
 from .session import ResidentCanopy, Session, solve
-from .sun import SunPosition, sun_position
+from .solar import SunPosition, sun_position
 from .tables import OrganTable, SoilTable, TriangleTable
 from .weather import clear_sky, perez_sky
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from . import arrays
 from .errors import InputError
-from .sun import SunPosition, up
+from .solar import SunPosition, up
 
 Irradiance = float | Mapping[str, float]
 

@@ -9,7 +9,7 @@ from typing import Any
 from . import arrays
 from .errors import InputError
 from .light import BRIGHTNESS, CLEARNESS, Irradiance, Light, Sky, Sources, by_band, one_source
-from .sun import SunPosition, air_mass, extraterrestrial_W_m2, sun_position, up
+from .solar import SunPosition, air_mass, extraterrestrial_W_m2, sun_position, up
 
 _ByBand = Mapping["str | None", float]
 

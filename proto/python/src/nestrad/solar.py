@@ -221,7 +221,7 @@ _READ: dict[str, list[tuple[float, ...]]] = {}
 
 def _terms() -> dict[str, list[tuple[float, ...]]]:
     if not _READ:
-        text = resources.files(__package__).joinpath("sun_terms.txt").read_text("ascii")
+        text = resources.files(__package__).joinpath("solar_terms.txt").read_text("ascii")
         for line in text.splitlines():
             if not line.startswith("#"):
                 name, *values = line.split()
