@@ -17,8 +17,8 @@ fn package() -> PathBuf {
 fn set_up(venv: &Path) -> bool {
     let mut set_up = Command::new("sh");
     set_up.arg(package().join("set_up")).arg(venv);
-    set_up.stdout(Stdio::null()).stderr(Stdio::piped());
-    let made = finish(set_up);
+    // packages come from elsewhere, and pip knows how long to wait for them
+    let made = set_up.output().unwrap();
     match made.status.code() {
         Some(0) => true,
         Some(77) => {
