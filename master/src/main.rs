@@ -1,33 +1,7 @@
 //! `nestrad`: light in plant canopies, from the command line.
 
-#![allow(
-    non_snake_case,
-    reason = "units in names are written as units: irradiance_W_m2"
-)]
-
-mod cli;
-
 use std::process::ExitCode;
 
-use clap::Parser;
-
-use cli::{Cli, Command};
-
 fn main() -> ExitCode {
-    nestrad_engine::heap::settle();
-    let command = match Cli::try_parse() {
-        Ok(cli) => cli.command,
-        Err(usage) => return cli::code_of(|| Err(usage.into())),
-    };
-    cli::code_of(|| match command {
-        Command::Solve(args) => args.run(),
-        Command::Check(args) => args.run(),
-        Command::Generate(args) => args.run(),
-        Command::Report(args) => args.run(),
-        Command::Series(args) => args.run(),
-        Command::Day(args) => args.run(),
-        Command::Serve(args) => args.run(),
-        Command::Status(args) => args.run(),
-        Command::Trade(args) => args.run(),
-    })
+    nestrad_master::run()
 }

@@ -1,6 +1,6 @@
 //! The messages that master, workers and clients exchange, generated from `nestrad/v1/*.proto`, which
 //! documents them field by field, and the channels that they travel on. And what master and worker have in common as
-//! processes: the [`log`], and what is said of their [`usage`].
+//! processes: the [`log`], what is said of their [`usage`], and the [`parent`] that they may have.
 //!
 //! This crate may import the kernel and `nestrad-common`; [`near_field`] turns their types into messages and back.
 
@@ -14,6 +14,7 @@ pub mod guard;
 pub mod log;
 mod mesh;
 pub mod near_field;
+pub mod parent;
 pub mod reason;
 pub mod token;
 pub mod usage;

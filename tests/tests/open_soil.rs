@@ -5,6 +5,7 @@
 use std::f64::consts::TAU;
 
 use glam::{DVec2, DVec3};
+use nestrad_common::optics::LeafOptics;
 use nestrad_engine::exchange::ThisProcess;
 use nestrad_engine::plan::Settings;
 use nestrad_engine::rounds::Ended;
@@ -158,6 +159,61 @@ fn shadows_of_one_traced_wall_follow_the_sun() {
         let lit = |run: &Run| traced.lit(&scene.optics, &sources, &plan.light, run);
         let (again, _) = unwatched(lit).unwrap();
         assert!(again == finish(scene, &plan).unwrap().solution);
+    }
+}
+
+/// What differential horizontal ground at (x, y) sees of the white wall, y > 0 away from it (configuration factor of an
+/// element to a perpendicular rectangle, Howell B-4).
+fn wall_from_ground(x: f64, y: f64) -> f64 {
+    let to_corner = |width: f64| {
+        let slant = WALL.height_m.hypot(y);
+        ((width / y).atan() - y / slant * (width / slant).atan()) / TAU
+    };
+    to_corner(WALL.half_width_m - x) + to_corner(WALL.half_width_m + x)
+}
+
+/// Between a wall and bright soil light goes to and fro. What the wall sent onto soil beyond the map did not come back: its
+/// irradiance was 149.6 W m-2, with 0.1 stated.
+#[test]
+fn soil_beyond_the_map_sends_back_what_plants_scatter_onto_it() {
+    const WALL_RHO: f64 = 0.95;
+    const BRIGHT_SOIL: f64 = 0.8;
+    let mut scenery = Scenery::open().soil(0.0);
+    let upright = Wall::upright(0.0, WALL.half_width_m, [0.0, WALL.height_m]);
+    scenery.quad("wall", upright);
+    scenery.band(
+        "NIR",
+        BRIGHT_SOIL,
+        &[("wall", LeafOptics::symmetric(WALL_RHO, 0.0))],
+    );
+    // it shines on the upper face, which looks towards +y
+    scenery.source(DVec3::new(0.0, -1.0, -1.0).normalize(), ON_GROUND_W_M2);
+    // of the wall onto soil and back, by reciprocity the integral of the square over the ground, per area of the wall
+    const STEPS: usize = 300;
+    let mut square_m2 = 0.0;
+    for j in 0..STEPS {
+        let y_m = |j: usize| 1e-4 * 1e6f64.powf(j as f64 / STEPS as f64);
+        let (y, dy) = ((y_m(j) * y_m(j + 1)).sqrt(), y_m(j + 1) - y_m(j));
+        let x_m = |i: usize| 30.0 * (4.0 * i as f64 / STEPS as f64).sinh() / 4f64.sinh();
+        for i in 0..STEPS {
+            let seen = wall_from_ground(0.5 * (x_m(i) + x_m(i + 1)), y);
+            square_m2 += 2.0 * seen * seen * (x_m(i + 1) - x_m(i)) * dy;
+        }
+    }
+    let back = square_m2 / (2.0 * WALL.half_width_m * WALL.height_m);
+    let first = ON_GROUND_W_M2 * (1.0 + 0.5 * BRIGHT_SOIL);
+    let expected = first / (1.0 - BRIGHT_SOIL * WALL_RHO * back);
+    for estimator in ESTIMATORS {
+        let solution = solve(&scenery.scene(), &by(estimator)).solution;
+        let wall = organ(&scenery, &solution, "wall");
+        let off = wall.irradiance_upper_W_m2 - expected;
+        // the wall is taken as evenly bright
+        assert!(off.abs() < 0.35, "{estimator:?}: {off} of {expected}");
+        let balance = &solution.balance[0];
+        assert!(
+            balance.closure_W.value.abs() < 3.0 * balance.closure_W.se + 0.1,
+            "{balance:?}"
+        );
     }
 }
 

@@ -12,7 +12,7 @@ use nestrad_tests::processes::{Master, program};
 
 const README: &str = concat!(env!("CARGO_MANIFEST_DIR"), "/../README.md");
 /// The programs that commands begin with.
-const PROGRAMS: [&str; 5] = ["nestrad", "cargo", "cd", "tests/python/", "venv/bin/"];
+const PROGRAMS: [&str; 5] = ["nestrad", "cargo", "cd", "python3", "venv/bin/"];
 /// What is built already is not built again in another way.
 const RELEASE: &str = "cargo run --release --bin nestrad --";
 /// Where the service of the README listens, which may be taken here.
@@ -20,8 +20,14 @@ const SERVICE: &str = "127.0.0.1:7410";
 /// Beginnings of commands that are not run, and why.
 const SKIPPED: [(&str, &str); 3] = [
     ("cargo test", "it is what runs this test"),
-    ("tests/python/set_up", "it needs a network, for packages"),
-    ("venv/bin/python", "it needs what tests/python/set_up makes"),
+    (
+        "python3 -m venv",
+        "it needs a network, for packages: proto/python/tests/wheel does it",
+    ),
+    (
+        "venv/bin/python",
+        "it needs the package: proto/python/tests/test_pages.py does it",
+    ),
 ];
 
 /// Beginnings of commands, and what they leave behind.

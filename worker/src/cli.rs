@@ -1,20 +1,21 @@
 //! The command line of a worker.
 
 use std::fs;
-use std::io::{Read, Write};
+use std::io::Write;
 use std::process::ExitCode;
-use std::thread;
 
 use anyhow::{Context, Result};
 use clap::Parser;
 use nestrad_common::threads::{MOST_THREADS, Threads};
 use nestrad_proto::channel::{Credentials, connect};
 use nestrad_proto::log::Log;
+use nestrad_proto::parent::end_with_stdin;
 use nestrad_proto::usage;
-use nestrad_worker::serving::{Offer, serve};
 use tokio::runtime::Builder;
 use tokio::signal::unix::{SignalKind, signal};
 use tokio::sync::watch;
+
+use crate::serving::{Offer, serve};
 
 /// Computes near-field jobs for a nestrad master.
 ///
@@ -95,8 +96,7 @@ impl Cli {
                 let _ = stop.send(true);
             });
             if self.with_stdin {
-                let watching = thread::Builder::new().spawn(die_with_stdin);
-                watching.context("cannot start threads")?;
+                end_with_stdin().context("cannot start threads")?;
             }
             let channel = connect(&self.master, &self.credentials)?;
             serve(channel, offer, stopped).await?;
@@ -118,15 +118,6 @@ impl Cli {
             memory_bytes: memory.unwrap_or_else(|| free_memory_bytes() / 4 * 3),
         }
     }
-}
-
-/// Ends the process when the parent that holds the other end of stdin is gone: there is nobody left to
-/// take a result.
-fn die_with_stdin() {
-    let mut nothing = [0; 64];
-    let mut stdin = std::io::stdin().lock();
-    while stdin.read(&mut nothing).is_ok_and(|n| n > 0) {}
-    std::process::exit(0);
 }
 
 fn host_name() -> String {

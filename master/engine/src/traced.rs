@@ -208,7 +208,7 @@ impl TracedCanopy {
         watch: &mut Stopwatch,
     ) -> Result<(Solution, WorkDone), SolveError> {
         let (frame, optics, plan) = (&self.frame, &light.optics, light.plan);
-        let outer_soil_W_m2 = outer_soil::radiosity_W_m2(frame, optics, light.sources, direct);
+        let mut outer_soil_W_m2 = outer_soil::radiosity_W_m2(frame, optics, light.sources, direct);
         let dark = Outlook::default();
         let mut outlook = Cow::Borrowed(&dark);
         let mut irradiance = Irradiance::default();
@@ -223,19 +223,41 @@ impl TracedCanopy {
                 within: looks[0].sampled(&lit[0]),
                 without_end: looks[1].sampled(&lit[1]),
             });
-            let system = System {
-                frame,
-                optics,
-                exchange: &scattering.exchange,
-                outlook: &outlook,
-                groups: &scattering.groups,
-                far: far.map(|far| &far.rows),
-                direct_W_m2: &direct.irradiance_W_m2,
-                fixed_W_m2: &fixed_radiosity_W_m2(frame, optics, light.sources, &outer_soil_W_m2),
-                incoming_W: &direct.incoming_W,
-                far_sample: sample,
+            let solved = |outer_soil_W_m2: &[f64]| {
+                let system = System {
+                    frame,
+                    optics,
+                    exchange: &scattering.exchange,
+                    outlook: &outlook,
+                    groups: &scattering.groups,
+                    far: far.map(|far| &far.rows),
+                    direct_W_m2: &direct.irradiance_W_m2,
+                    fixed_W_m2: &fixed_radiosity_W_m2(
+                        frame,
+                        optics,
+                        light.sources,
+                        outer_soil_W_m2,
+                    ),
+                    incoming_W: &direct.incoming_W,
+                    far_sample: sample,
+                };
+                solve_system(&system, &plan.scattering_bands, &plan.tolerance, run.stop)
             };
-            irradiance = solve_system(&system, &plan.scattering_bands, &plan.tolerance, run.stop)?;
+            irradiance = solved(&outer_soil_W_m2)?;
+            let sent_back = outer_soil::sent_back_W_m2(
+                (frame, optics),
+                (&scattering.exchange, &outlook),
+                (&irradiance, &plan.scattering_bands),
+                &direct.incoming_W,
+            );
+            if let Some(sent_back) = sent_back {
+                for (sum, back) in outer_soil_W_m2.iter_mut().zip(&sent_back) {
+                    *sum += back;
+                }
+                let passes = irradiance.passes;
+                irradiance = solved(&outer_soil_W_m2)?;
+                irradiance.passes += passes;
+            }
             watch.lap("solve");
             run.stop.check()?;
         }

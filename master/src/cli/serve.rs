@@ -10,6 +10,7 @@ use nestrad_common::threads::Threads;
 use nestrad_proto::access::Access;
 use nestrad_proto::connections::{ConnectionLimits, Connections};
 use nestrad_proto::log::Log;
+use nestrad_proto::parent::end_with_stdin;
 use nestrad_service::server::{Service, ServiceLimits};
 use tokio::net::TcpListener;
 use tokio::signal::unix::{SignalKind, signal};
@@ -28,6 +29,10 @@ pub(crate) struct ServeArgs {
     /// Address for clients and workers; port 0 is any free port
     #[arg(long, value_name = "ADDRESS:PORT", default_value = "127.0.0.1:7410")]
     listen: SocketAddr,
+
+    /// Exit when stdin closes, whatever is running: for a parent process that may end without notice
+    #[arg(long)]
+    with_stdin: bool,
 
     #[command(flatten)]
     access: Access,
@@ -112,6 +117,9 @@ impl LimitFlags {
 impl ServeArgs {
     pub(crate) fn run(self) -> Result<()> {
         let _log = Log::begin("NESTRAD_LOG")?;
+        if self.with_stdin {
+            end_with_stdin().context("cannot start threads")?;
+        }
         let runtime = tokio::runtime::Builder::new_multi_thread()
             .worker_threads(2)
             .enable_all()

@@ -1,5 +1,8 @@
 //! Masters that stop, or are stopped.
 
+use std::io::{BufRead, BufReader};
+use std::process::Stdio;
+
 use nestrad_proto::channel::{Credentials, connect};
 use nestrad_proto::v1;
 use nestrad_tests::calls::{block_on, client};
@@ -137,6 +140,19 @@ fn a_master_that_is_killed_goes_on_from_its_state_to_the_same_bytes() {
     let folder = state.path("state").display().to_string();
     killed_and_started_again(&["--state", &folder]);
     assert!(state.path("state").read_dir().unwrap().next().is_some());
+}
+
+#[test]
+fn a_master_with_stdin_ends_with_the_process_that_holds_it() {
+    let desk = Desk::new();
+    let args = ["serve", "--listen", "127.0.0.1:0", "--with-stdin"];
+    let mut serve = nestrad(desk.folder(), &args);
+    let mut child = serve.stdin(Stdio::piped()).spawn().unwrap();
+    let mut lines = BufReader::new(child.stderr.take().unwrap()).lines();
+    assert!(lines.any(|line| line.unwrap().contains("serves address=")));
+    assert!(child.try_wait().unwrap().is_none());
+    drop(child.stdin.take());
+    assert_eq!(wait_for(child).status.code(), Some(0));
 }
 
 #[test]

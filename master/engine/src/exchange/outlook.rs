@@ -25,6 +25,9 @@ pub struct Outlook {
     blind: Vec<(u32, usize)>,
 }
 
+/// Rows whose sums are added in order: they depend on this, not on the number of threads.
+const AT_ONCE: usize = 1 << 14;
+
 impl Outlook {
     /// Counts what is seen by each row.
     pub fn of(frame: &Frame, exchange: &Exchange) -> Self {
@@ -45,7 +48,7 @@ impl Outlook {
         let blind = |(row, [a, b]): (u32, &[Seen; 2])| {
             (a.counted + b.counted == 0).then_some((row, a.buried + b.buried))
         };
-        Self {
+        let mut outlook = Self {
             weight: [0, 1].map(|h: usize| seen.iter().map(|s| per(1, s[h].counted)).collect()),
             exposed: seen
                 .par_iter()
@@ -61,13 +64,55 @@ impl Outlook {
             } else {
                 Default::default()
             },
-            outer_soil_m2: if any(|s| s.outer) {
-                outer_soil_m2(frame, exchange, &seen)
-            } else {
-                Vec::new()
-            },
+            outer_soil_m2: Vec::new(),
             blind: (0..).zip(&seen).filter_map(blind).collect(),
+        };
+        if any(|s| s.outer) {
+            outlook.outer_soil_m2 = outlook.onto_outer_soil_W(frame, exchange, |_| 1.0);
         }
+        outlook
+    }
+
+    /// What rows of these radiosities (W m⁻²) send onto the soil beyond the map of an open scene, W: onto each zone of it,
+    /// and onto what lies beyond all zones.
+    pub fn onto_outer_soil_W(
+        &self,
+        frame: &Frame,
+        exchange: &Exchange,
+        radiosity_W_m2: impl Fn(usize) -> f64 + Sync,
+    ) -> Vec<f64> {
+        let (ends, rows) = (&frame.ends, frame.rows());
+        let zones = ends.outer_zones as usize + 1;
+        let of_rows = |first: usize| {
+            let mut sums = vec![0.0; zones];
+            for row in first..rows.min(first + AT_ONCE) {
+                if self.to_void(0, row) + self.to_void(1, row) == 0.0 {
+                    continue;
+                }
+                let lines: f64 = self.weight.iter().map(|w| per_f64(1.0, w[row])).sum();
+                let power_W = radiosity_W_m2(row) * frame.row_area_m2(row) * self.exposed[row];
+                let of_a_line_W = per_f64(power_W, lines);
+                for half in &exchange.halves {
+                    for &end in half.row(row).iter().filter(|&&e| ends.is_outer_soil(e)) {
+                        let zone = end.checked_sub(ends.zone(0)).unwrap_or(ends.outer_zones);
+                        sums[zone as usize] += of_a_line_W;
+                    }
+                }
+            }
+            sums
+        };
+        let parts: Vec<Vec<f64>> = (0..rows)
+            .into_par_iter()
+            .step_by(AT_ONCE)
+            .map(of_rows)
+            .collect();
+        let mut sums = vec![0.0; zones];
+        for part in &parts {
+            sums.iter_mut()
+                .zip(part)
+                .for_each(|(sum, part)| *sum += part);
+        }
+        sums
     }
 
     /// Bytes that it takes.
@@ -104,25 +149,8 @@ impl Outlook {
     }
 }
 
-/// What all rows see of the soil beyond the map: see [`Outlook::outer_soil_m2`].
-fn outer_soil_m2(frame: &Frame, exchange: &Exchange, seen: &[[Seen; 2]]) -> Vec<f64> {
-    let ends = &frame.ends;
-    let mut sums = vec![0.0; ends.outer_zones as usize + 1];
-    for (row, [a, b]) in seen.iter().enumerate() {
-        if a.outer + b.outer == 0 {
-            continue;
-        }
-        let lines = (a.counted + b.counted, a.buried + b.buried);
-        let area_m2 = frame.row_area_m2(row) * frame.share_above_soil(row) * exposed(lines);
-        let of_a_line = area_m2 * per(1, lines.0);
-        for half in &exchange.halves {
-            for &end in half.row(row).iter().filter(|&&e| ends.is_outer_soil(e)) {
-                let zone = end.checked_sub(ends.zone(0)).unwrap_or(ends.outer_zones);
-                sums[zone as usize] += of_a_line;
-            }
-        }
-    }
-    sums
+fn per_f64(part: f64, of: f64) -> f64 {
+    if of == 0.0 { 0.0 } else { part / of }
 }
 
 fn per(part: usize, of: usize) -> f64 {
