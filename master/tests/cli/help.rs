@@ -162,7 +162,7 @@ fn calls_that_make_no_sense_are_refused_with_code_2() {
                 "--latitude",
                 "-3",
             ]),
-            "for --sky clear",
+            "are for skies with a sun",
         ),
         (
             sky(&["uniform-overcast", "--irradiance", "PAR=much"]),

@@ -239,11 +239,10 @@ fn in_one_round(
     scene: &Scene,
     then: impl Fn(&Stop) -> ExchangeError + Sync,
 ) -> (Result<Solved, RoundsError>, Vec<Plan>) {
-    // where there is time enough but not endless, a coarse look comes first
+    // so fine that a coarse look comes first
     let settings = Settings {
-        accuracy_percent: 0.5,
+        accuracy_percent: 0.1,
         in_rounds: true,
-        budget_s: Some(1e6),
         ..Settings::default()
     };
     let (cuts, stop) = (AtomicUsize::new(0), Stop::default());
