@@ -78,6 +78,8 @@ def test_the_numbers_are_those_of_the_command_line(tmp_path, accuracy):
         for name in columns:
             assert theirs[name].tolist() == nine_digits(getattr(ours, name)), name
         assert theirs["area_m2"].tolist() == nine_digits(np.repeat(ours.area_m2, 2))
+    for name in ("sunlit_area_m2", "shaded_area_m2", "sunlit_area_se_m2"):
+        assert organs[name].tolist() == nine_digits(np.repeat(getattr(found.organs, name), 2)), name
     for frame, theirs in ((found.organs.to_pandas(), organs), (found.triangles.to_pandas(), triangles)):
         assert list(frame.columns) == list(theirs)
         for name in ("species", "plant", "organ", "kind", "band"):

@@ -45,6 +45,9 @@ def organs(fetch: Fetch, canopy: Canopy, bands: Sequence[str]) -> OrganTable:
         for name in _ITEM:
             getattr(table, name)[at:end] = _rows(getattr(part.light, name), bands)
         table.absorbed_bias_W[at:end] = _rows(part.absorbed_bias_W, bands)
+        if part.sunlit_area_m2:
+            table.sunlit_area_m2[at:end] = part.sunlit_area_m2
+            table.sunlit_area_se_m2[at:end] = part.sunlit_area_se_m2
         at = end
     _complete("organs", at, len(table.area_m2))
     return table

@@ -28,6 +28,8 @@ class Table:
     _rows_are = "row"
     _labels: tuple[str, ...] = ()
     _per_row: tuple[str, ...] = ()
+    #: the same, behind the columns of bands
+    _sunlit: tuple[str, ...] = ()
     #: the names of the columns with a value per band
     per_band: ClassVar[tuple[str, ...]] = ()
 
@@ -52,6 +54,8 @@ class Table:
         columns["band"] = np.tile(np.array(self.bands), len(self))
         for name in self.per_band:
             columns[name] = getattr(self, name).reshape(-1)
+        for name in self._sunlit:
+            columns[name] = np.repeat(getattr(self, name), count)
         frame: pd.DataFrame = pandas.DataFrame(columns)
         return frame
 
@@ -60,7 +64,7 @@ class Table:
         xarray = package("xarray")
         rows = self._rows_are
         data: dict[str, Any] = {name: ((rows, "band"), getattr(self, name)) for name in self.per_band}
-        data |= {name: ((rows,), getattr(self, name)) for name in self._per_row}
+        data |= {name: ((rows,), getattr(self, name)) for name in (*self._per_row, *self._sunlit)}
         labels = {name: ((rows,), getattr(self, name)) for name in self._labels if name != rows}
         own = getattr(self, rows) if rows in self._labels else np.arange(len(self))
         found: xr.Dataset = xarray.Dataset(data, {rows: (rows, own), "band": list(self.bands), **labels})
@@ -71,7 +75,7 @@ class Table:
         return found
 
     def __repr__(self) -> str:
-        columns = ", ".join((*self._labels, *self._per_row, *self.per_band))
+        columns = ", ".join((*self._labels, *self._per_row, *self.per_band, *self._sunlit))
         return f"<{type(self).__name__}: {len(self)} rows, bands {', '.join(self.bands)}; {columns}>"
 
 
@@ -97,10 +101,16 @@ class OrganTable(Table):
     absorbed_se_W: Floats
     #: the error that comes in addition: by elements, by directions of a sky, by the far field
     absorbed_bias_W: Floats
+    #: (n,), one-sided area that the sun reaches on either side: the source, not of a sky, with the most light
+    #: perpendicular to itself; NaN without one
+    sunlit_area_m2: Floats
+    #: (n,), one standard error of it
+    sunlit_area_se_m2: Floats
 
     _rows_are = "organ"
     _labels = ("species", "plant", "organ", "kind")
     _per_row = ("area_m2",)
+    _sunlit = ("sunlit_area_m2", "shaded_area_m2", "sunlit_area_se_m2")
     per_band: ClassVar[tuple[str, ...]] = (
         "irradiance_upper_W_m2",
         "irradiance_lower_W_m2",
@@ -109,6 +119,11 @@ class OrganTable(Table):
         "absorbed_se_W",
         "absorbed_bias_W",
     )
+
+    @property
+    def shaded_area_m2(self) -> Floats:
+        """(n,), the area that the sun does not reach; NaN without a sun."""
+        return np.maximum(self.area_m2 - self.sunlit_area_m2, 0.0)
 
 
 @dataclass(repr=False)
@@ -202,7 +217,8 @@ def empty_organs(canopy: Canopy, bands: Sequence[str]) -> OrganTable:
     rows, shape = len(canopy.organ), (len(canopy.organ), len(bands))
     columns = (np.zeros(shape) for _ in OrganTable.per_band)
     names = (canopy.species, canopy.plant, canopy.organ, canopy.organ_kinds())
-    return OrganTable(tuple(bands), *names, np.zeros(rows), *columns)
+    sunlit = (np.full(rows, np.nan) for _ in range(2))
+    return OrganTable(tuple(bands), *names, np.zeros(rows), *columns, *sunlit)
 
 
 def empty_triangles(canopy: Canopy, bands: Sequence[str]) -> TriangleTable:
