@@ -7,7 +7,9 @@ use super::clock::Clock;
 use super::limits::Planned;
 use super::work::{Takes, work_s};
 use super::{lit_canopy, sources_for};
-use crate::plan::{Aims, LEAST_ACCURACY_PERCENT, Plan, PlanError, Settings, WorkCounts};
+use crate::plan::{
+    Aims, DEFAULT_ACCURACY_PERCENT, LEAST_ACCURACY_PERCENT, Plan, PlanError, Settings, WorkCounts,
+};
 
 /// A coarse look comes first where it takes less than this part of what is planned without one.
 const WORTH_A_LOOK: f64 = 0.2;
@@ -55,14 +57,21 @@ fn in_time(scene: &Scene, settings: &Settings, clock: &Clock) -> Result<Planned,
     if allows(&wanted) {
         return Ok(wanted);
     }
+    // the same steps whatever is asked for, so that who asks for more is not given less
+    let steps = |coarsest: f64, finest: f64| {
+        move |part: f64| Aims::of((coarsest * (finest / coarsest).powf(part)).max(asked))
+    };
+    if asked < DEFAULT_ACCURACY_PERCENT {
+        let usual = planned(&Aims::of(DEFAULT_ACCURACY_PERCENT))?;
+        if allows(&usual) {
+            let step = steps(DEFAULT_ACCURACY_PERCENT, LEAST_ACCURACY_PERCENT);
+            return finest(usual, allows, |part| planned(&step(part)));
+        }
+    }
     let look = planned(&Aims::pilot(asked))?;
     if allows(&look) {
-        // the same steps whatever is asked for, so that who asks for more is not given less
-        let step =
-            |part: f64| COARSE_PERCENT * (LEAST_ACCURACY_PERCENT / COARSE_PERCENT).powf(part);
-        return finest(look, allows, |part| {
-            planned(&Aims::of(step(part).max(asked)))
-        });
+        let step = steps(COARSE_PERCENT, DEFAULT_ACCURACY_PERCENT);
+        return finest(look, allows, |part| planned(&step(part)));
     }
     let best = quickest(scene, settings)?;
     if allows(&best) {
