@@ -69,6 +69,14 @@ impl LeafOptics {
         face.absorptance()
     }
 
+    /// Radiosities of the upper and of the lower face under these irradiances of them, in the same unit.
+    pub fn radiosities(&self, [upper, lower]: [f64; 2]) -> [f64; 2] {
+        [
+            self.upper.rho * upper + self.lower.tau * lower,
+            self.lower.rho * lower + self.upper.tau * upper,
+        ]
+    }
+
     /// Refuses what is not physical: negative, not finite, or `rho + tau > 1` on a face.
     pub fn check(&self) -> Result<(), OpticsFault> {
         self.upper.check()?;

@@ -295,14 +295,9 @@ impl Parts<'_> {
             };
             for (e, &t) in frame.triangle_of_element.iter().enumerate() {
                 let optics = band.materials[frame.material[t as usize] as usize];
-                add(
-                    2 * e,
-                    optics.upper.rho * on(2 * e) + optics.lower.tau * on(2 * e + 1),
-                );
-                add(
-                    2 * e + 1,
-                    optics.lower.rho * on(2 * e + 1) + optics.upper.tau * on(2 * e),
-                );
+                let [upper, lower] = optics.radiosities([on(2 * e), on(2 * e + 1)]);
+                add(2 * e, upper);
+                add(2 * e + 1, lower);
             }
             for row in frame.ends.faces() as usize..frame.rows() {
                 add(row, band.soil_albedo * on(row));

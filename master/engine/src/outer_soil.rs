@@ -64,15 +64,7 @@ pub(crate) fn sent_back_W_m2(
             }
             let t = frame.triangle_of_element[row / 2] as usize;
             let material = &band.materials[frame.material[t] as usize];
-            let upper = row.is_multiple_of(2);
-            let face = |upper| {
-                if upper {
-                    material.upper
-                } else {
-                    material.lower
-                }
-            };
-            face(upper).rho * on(row) + face(!upper).tau * on(row ^ 1)
+            material.radiosities([on(row & !1), on(row | 1)])[row & 1]
         };
         let onto_W = outlook.onto_outer_soil_W(frame, exchange, radiosity_W_m2);
         let mut back_W = 0.0;

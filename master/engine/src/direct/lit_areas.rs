@@ -7,7 +7,6 @@ use nestrad_kernel::zbuffer::ZBuffer;
 use super::classes::Classes;
 use super::outlines::{Outline, Outlines};
 use super::shadow::Shade;
-use super::sunlit::SunlitArea;
 use crate::frame::Frame;
 
 /// What a direction lights.
@@ -38,6 +37,15 @@ pub(super) struct LitAreas {
     pub(super) probed_m2: Option<[f64; 3]>,
     /// Of each organ, if this is the sun.
     pub(super) sunlit: Vec<SunlitArea>,
+}
+
+/// One-sided area of an organ that a direction reaches, on whichever side.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SunlitArea {
+    /// All of it.
+    pub area_m2: f64,
+    /// Its variance.
+    pub variance_m4: f64,
 }
 
 /// A face that is lit. There are as many as a canopy has, for each direction that is kept: they are small.

@@ -35,8 +35,8 @@ use rayon::prelude::*;
 
 pub use effort::spread_effort;
 pub use kept::KeptDirections;
+pub use lit_areas::SunlitArea;
 pub use shares::ShareVariances;
-pub use sunlit::SunlitArea;
 
 use crate::frame::Frame;
 use crate::stop::Stopped;

@@ -3,18 +3,9 @@
 use nestrad_common::light::Sources;
 
 use super::dealing::Beam;
-use super::lit_areas::{LitAreas, Scratch};
+use super::lit_areas::{LitAreas, Scratch, SunlitArea};
 use super::outlines;
 use super::probe::Thin;
-
-/// One-sided area of an organ that a direction reaches, on whichever side.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct SunlitArea {
-    /// All of it.
-    pub area_m2: f64,
-    /// Its variance.
-    pub variance_m4: f64,
-}
 
 /// The number of the sun: of the sources that are not directions of a sky, the one with the most light perpendicular to
 /// itself, in all bands together; the first of equals.

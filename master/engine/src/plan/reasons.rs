@@ -24,7 +24,7 @@ pub(super) fn of(lit: &LitCanopy, settings: &Settings, plan: &Plan) -> Vec<Strin
         plan.memory.scene_GiB,
         plan.memory.rows_GiB,
         plan.memory.solver_GiB,
-        settings.memory_GiB
+        (1e3 * settings.memory_GiB).round() / 1e3
     ));
     lines.extend(limits(settings, plan));
     lines

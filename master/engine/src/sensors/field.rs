@@ -88,10 +88,7 @@ fn of_direct(around: &Surroundings, b: usize) -> Vec<f64> {
             * (optics.upper.absorptance() * upper + optics.lower.absorptance() * lower);
         if absorbed_W > 0.0 {
             let relative = direct.element_variance_W2[e * bands + b] / (absorbed_W * absorbed_W);
-            let sent = [
-                optics.upper.rho * upper + optics.lower.tau * lower,
-                optics.lower.rho * lower + optics.upper.tau * upper,
-            ];
+            let sent = optics.radiosities([upper, lower]);
             for (side, sent) in sent.into_iter().enumerate() {
                 variances[2 * e + side] = relative * sent * sent;
             }
@@ -112,9 +109,8 @@ fn of_half(around: &Surroundings, (k, b): (usize, usize), half: usize) -> Vec<f6
     let mut radiosity = vec![0.0; ends.len()];
     for (e, &t) in frame.triangle_of_element.iter().enumerate() {
         let optics = band.materials[frame.material[t as usize] as usize];
-        let (upper, lower) = (on(2 * e), on(2 * e + 1));
-        radiosity[2 * e] = optics.upper.rho * upper + optics.lower.tau * lower;
-        radiosity[2 * e + 1] = optics.lower.rho * lower + optics.upper.tau * upper;
+        let sent = optics.radiosities([on(2 * e), on(2 * e + 1)]);
+        radiosity[2 * e..][..2].copy_from_slice(&sent);
     }
     let soil = ends.faces() as usize..frame.rows();
     for (row, out) in soil.clone().zip(&mut radiosity[soil]) {
