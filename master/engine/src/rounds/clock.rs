@@ -13,8 +13,15 @@ use crate::stop::Stop;
 pub(super) struct Clock {
     begun: Instant,
     budget_s: f64,
-    /// What a second takes here that is reckoned for one core, s: of the exchange, of direct light, of the rest.
-    slower: Takes,
+    slower: Slower,
+}
+
+/// How many times as long as on the one core that it is reckoned for a part of a round takes here.
+#[derive(Clone, Copy)]
+struct Slower {
+    trace: f64,
+    light: f64,
+    rest: f64,
 }
 
 /// A round is planned to take this part of the time that is left at most: what it takes is not known better.
@@ -40,10 +47,10 @@ impl Clock {
         Self {
             begun: Instant::now(),
             budget_s,
-            slower: Takes {
-                trace_s: slower,
-                light_s: slower,
-                rest_s: slower,
+            slower: Slower {
+                trace: slower,
+                light: slower,
+                rest: slower,
             },
         }
     }
@@ -58,9 +65,8 @@ impl Clock {
 
     /// What should take so long on one core takes here, s.
     pub(super) fn takes_s(&self, takes: Takes) -> f64 {
-        self.slower.trace_s * takes.trace_s
-            + self.slower.light_s * takes.light_s
-            + self.slower.rest_s * takes.rest_s
+        let Slower { trace, light, rest } = self.slower;
+        trace * takes.trace_s + light * takes.light_s + rest * takes.rest_s
     }
 
     /// Whether a plan should be done in time.
@@ -85,20 +91,16 @@ impl Clock {
                 *slower = took_s / should_s;
             }
         };
-        learnt(&mut self.slower.trace_s, should.trace_s, took.trace_s);
-        learnt(&mut self.slower.light_s, should.light_s, took.light_s);
-        learnt(&mut self.slower.rest_s, should.rest_s, took.rest_s);
+        learnt(&mut self.slower.trace, should.trace_s, took.trace_s);
+        learnt(&mut self.slower.light, should.light_s, took.light_s);
+        learnt(&mut self.slower.rest, should.rest_s, took.rest_s);
     }
 
     /// Learns from a round that was stopped how slow this machine is at least.
     pub(super) fn learn_at_least(&mut self, should: Takes, took_s: f64) {
         let slower = took_s / self.takes_s(should).max(f64::MIN_POSITIVE);
-        let Takes {
-            trace_s,
-            light_s,
-            rest_s,
-        } = &mut self.slower;
-        for part in [trace_s, light_s, rest_s] {
+        let Slower { trace, light, rest } = &mut self.slower;
+        for part in [trace, light, rest] {
             *part *= slower.max(1.0);
         }
     }

@@ -47,8 +47,8 @@ pub(super) fn first(
     }
 }
 
-/// Where time is short: what is asked for where that should take half of the time, else the finest plan that should.
-/// It leaves time for another, which is planned by what this one measures.
+/// Where time is short: what is asked for, or the finest plan that should leave time for another, which is planned by
+/// what this one measures.
 fn in_time(scene: &Scene, settings: &Settings, clock: &Clock) -> Result<Planned, PlanError> {
     let asked = settings.accuracy_percent;
     let planned = |aims: &Aims| planned(scene, settings, aims);

@@ -78,7 +78,7 @@ class Balance(Mapping[str, BandBalance]):
         return "\n".join(f"{b:8} {t:20} {v:12.5g} W +- {s:.2g}" for b, t, v, s in self.rows())
 
     def _repr_html_(self) -> str:
-        return page.balance(self)
+        return page.balance(list(self), self.rows())
 
 
 @dataclass(frozen=True)
@@ -128,7 +128,7 @@ class CanopyLight:
         return f"<nestrad.CanopyLight: {len(self.organs)} organs; {', '.join(shares)}{more}>"
 
     def _repr_html_(self) -> str:
-        return page.light(self)
+        return page.light(self.balance._repr_html_(), self.organs, self.warnings)
 
 
 def balance_of(summary: Any) -> Balance:
