@@ -5,6 +5,7 @@
 //! planned by what the last one measured (`next.rs`).
 
 mod accuracy;
+mod allot;
 mod clock;
 mod first;
 mod limits;
