@@ -1,4 +1,3 @@
-
 use super::*;
 use glam::{DVec2, DVec3};
 use nestrad_common::canopy::{Material, Mesh, Organ, Pattern, Triangle};
